@@ -5,12 +5,10 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { goldenFrames, serialPort, simulator, typesOf } from './knob.mjs';
 import { scores } from './module.mjs';
-import { launch, open, serve } from './page.mjs';
+import { DYNAMIC, HEARD, KEY, LEVEL, SILENT, SOUNDING, latest, launch, open, pictures, running, serve, settled, silence, until } from './page.mjs';
 import { QUIET_S, SENTENCES, blow, room, sequence, speech, writeWav } from './sounds.mjs';
 
 const [folder, own] = process.argv.slice(2);
-/** Places in the worklet's picture. */
-const [KEY, SOUNDING, DYNAMIC, LEVEL] = [0, 1, 5, 7];
 /** `chalumeau` with the simulated knob. */
 const PROGRAM = process.env.CHALUMEAU ?? new URL('../../target/debug/chalumeau', import.meta.url).pathname;
 /** Types of frames (docs/protocol.md), and the session of the golden ones. */
@@ -24,33 +22,9 @@ const SLOW = 'globalThis.requestAnimationFrame = (draw) => setTimeout(() => draw
 const AT_48_KHZ = `globalThis.AudioContext = class extends AudioContext {
   constructor(options) { super({ ...options, sampleRate: 48000 }); }
 }`;
-/** A sound that is meant, and silence, of full scale. */
-const [HEARD, SILENT] = [0.01, 0.0005];
 const SIZES = { phone: [390, 844], tablet: [820, 1180], desktop: [1440, 900] };
 
 const server = await serve(folder);
-const pictures = (page) => page.evaluate(() => globalThis.told);
-const latest = async (page) => (await pictures(page)).at(-1).picture;
-/** Waits until a picture's number is as asked. */
-const until = (page, place, low, high = Infinity, timeout = 15000) =>
-  page.waitForFunction(
-    ([place, low, high]) => {
-      const now = globalThis.told.at(-1)?.picture[place];
-      return now >= low && now < high;
-    },
-    [place, low, high],
-    { timeout, polling: 20 },
-  );
-/** A picture's number when it has stopped moving: a quarter of a second of sound later it is the same. */
-const settled = async (page, place) => {
-  for (let before = NaN; ; ) {
-    const seen = (await pictures(page)).length;
-    await page.waitForFunction((count) => globalThis.told.length >= count, seen + 8, { polling: 20 });
-    const now = (await latest(page))[place];
-    if (Math.abs(now - before) < 0.01) return now;
-    before = now;
-  }
-};
 /** Frequency of a steady tone within a semitone of another, Hz: the autocorrelation's peak some periods away. */
 function pitchHz(sound, near) {
   const periods = 40;
@@ -66,7 +40,6 @@ function pitchHz(sound, near) {
   const [a, b, c] = [values[top - 1], values[top], values[top + 1]];
   return (periods * 48000) / (middle - half + top + (a - c) / (2 * (a - 2 * b + c)));
 }
-const silence = (page) => until(page, LEVEL, 0, SILENT);
 
 /** Moves a hole by hand and by number, saves and opens it; with the fit, which takes its time, or without. */
 async function dragHole(browser, withFit) {
@@ -147,7 +120,7 @@ async function dragHole(browser, withFit) {
   await page.setInputFiles('#hole-file', saved);
   await page.waitForFunction(([name, x]) => globalThis.chalumeau.holes.moved.some((hole) => hole.name === name && Math.abs(hole.x_m - x) < 1e-6), [name, x_m]);
   await page.setInputFiles('#hole-file', { name: 'none.toml', mimeType: 'text/plain', buffer: Buffer.from('bore = 3') });
-  await page.waitForFunction(() => /none.toml is not opened/.test(document.getElementById('hint').textContent));
+  await page.waitForFunction(() => /^none.toml is not opened. This is not a Chalumeau instrument file/.test(document.getElementById('hole-state').textContent));
   assert.deepEqual(errors, []);
   await context.close();
   return `${Object.entries(pitches).map(([which, cents]) => `${which} ${cents.toFixed(2)} cents`).join(', ')}`;
@@ -705,27 +678,11 @@ const MICROPHONE = {
   },
 };
 
-const wanted = process.argv[4] ?? '';
-let [failed, ran] = [0, 0];
-async function run(tests, ...args) {
-  for (const [name, test] of Object.entries(tests).filter(([name]) => name.includes(wanted))) {
-    const began = Date.now();
-    ran += 1;
-    try {
-      const says = await test(...args);
-      console.log(`ok    ${name} (${((Date.now() - began) / 1000).toFixed(1)} s)${says ? `: ${says}` : ''}`);
-    } catch (error) {
-      failed += 1;
-      console.log(`FAIL  ${name}\n${error.stack}`);
-    }
-  }
-}
-
+const tests = running(process.argv[4]);
 const browser = await launch(own);
-await run(TESTS, browser);
-if (wanted.startsWith('timed')) await run(TIMED, browser);
+await tests.run(TESTS, browser);
+if (process.argv[4]?.startsWith('timed')) await tests.run(TIMED, browser);
 await browser.close();
-await run(MICROPHONE);
+await tests.run(MICROPHONE);
 server.close();
-if (ran === 0) console.log(`FAIL  no test has ${wanted} in its name`);
-process.exitCode = failed > 0 || ran === 0 ? 1 : 0;
+tests.end();

@@ -3,22 +3,37 @@
 import { createReadStream, existsSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { createRequire } from 'node:module';
-import { extname, join, normalize } from 'node:path';
+import { basename, extname, join, normalize } from 'node:path';
 
 const KINDS = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.json': 'application/json', '.wasm': 'application/wasm', '.svg': 'image/svg+xml' };
 
-/** Serves a folder below a path, as a page on a host of others is; returns the address. */
+/** Places in the worklet's picture: `PICTURE_NAMES` of web/src/playing.rs. */
+export const [KEY, SOUNDING, DYNAMIC, LEVEL] = [0, 1, 5, 7];
+/** A sound that is meant, and silence, of full scale. */
+export const [HEARD, SILENT] = [0.01, 0.0005];
+
+/**
+ * Serves a folder below a path, as a page on a host of others is; returns the address. `instead` has texts that are served in place
+ * of files, by their names, null for files that are lost, or a function that gives one of these or, after a time, nothing.
+ */
 export async function serve(folder) {
-  const server = createServer(({ url }, answer) => {
+  const instead = new Map();
+  const server = createServer(async ({ url }, answer) => {
     const path = join(folder, normalize(decodeURIComponent(new URL(url, 'http://x').pathname)).replace(/^\/below\/a\/path/, ''));
+    const name = basename(path);
+    const text = await (typeof instead.get(name) === 'function' ? instead.get(name)() : instead.get(name));
+    if (text !== undefined) return answer.writeHead(text === null ? 404 : 200, { 'Content-Type': KINDS[extname(path)] ?? 'text/plain' }).end(text ?? '');
     const file = existsSync(path) && statSync(path).isDirectory() ? join(path, 'index.html') : path;
     if (!existsSync(file)) return answer.writeHead(404).end();
     answer.writeHead(200, { 'Content-Type': KINDS[extname(file)] ?? 'application/octet-stream' });
     createReadStream(file).pipe(answer);
   });
   await new Promise((ready) => server.listen(0, '127.0.0.1', ready));
-  return { address: `http://localhost:${server.address().port}/below/a/path/`, close: () => server.close() };
+  return { address: `http://localhost:${server.address().port}/below/a/path/`, instead, close: () => server.close() };
 }
+
+/** A host of which nothing but http is known. */
+export const PLAIN_HOST = 'page.test';
 
 /** Chromium of the system, without a window; `sound` is what its microphone hears. */
 export async function launch(folder, sound) {
@@ -26,14 +41,15 @@ export async function launch(folder, sound) {
   const microphone = sound ? ['--use-fake-ui-for-media-stream', '--use-fake-device-for-media-stream', `--use-file-for-fake-audio-capture=${sound}%noloop`] : [];
   return chromium.launch({
     executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-    args: ['--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage', ...microphone],
+    // A name that is no secure origin, as the address of a machine in the network.
+    args: [`--host-resolver-rules=MAP ${PLAIN_HOST} 127.0.0.1`, '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage', ...microphone],
   });
 }
 
-/** Opens the page; its errors end the test. */
+/** Opens the page, alone or in a context `beside` others; its errors end the test. */
 export async function open(browser, address, options = {}) {
-  const { before, early, other, ...browserOptions } = options;
-  const context = await browser.newContext({ permissions: ['microphone'], ...browserOptions });
+  const { before, early, other, beside, ...browserOptions } = options;
+  const context = beside ?? (await browser.newContext({ permissions: ['microphone'], ...browserOptions }));
   const page = await context.newPage();
   const errors = [];
   page.on('pageerror', (error) => errors.push(String(error)));
@@ -49,4 +65,52 @@ export async function open(browser, address, options = {}) {
   await page.waitForFunction(() => globalThis.chalumeau);
   if (!early) await page.waitForFunction(() => globalThis.chalumeau.engine.node);
   return { page, context, errors };
+}
+
+export const pictures = (page) => page.evaluate(() => globalThis.told);
+export const latest = async (page) => (await pictures(page)).at(-1).picture;
+/** Waits until a picture's number is as asked. */
+export const until = (page, place, low, high = Infinity, timeout = 15000) =>
+  page.waitForFunction(
+    ([place, low, high]) => {
+      const now = globalThis.told.at(-1)?.picture[place];
+      return now >= low && now < high;
+    },
+    [place, low, high],
+    { timeout, polling: 20 },
+  );
+/** A picture's number when it has stopped moving: a quarter of a second of sound later it is the same. */
+export const settled = async (page, place) => {
+  for (let before = NaN; ; ) {
+    const seen = (await pictures(page)).length;
+    await page.waitForFunction((count) => globalThis.told.length >= count, seen + 8, { polling: 20 });
+    const now = (await latest(page))[place];
+    if (Math.abs(now - before) < 0.01) return now;
+    before = now;
+  }
+};
+export const silence = (page) => until(page, LEVEL, 0, SILENT);
+
+/** Runs tests, all or those with `wanted` in their names, and ends the program with their result. */
+export function running(wanted = '') {
+  let [failed, ran] = [0, 0];
+  return {
+    async run(tests, ...args) {
+      for (const [name, test] of Object.entries(tests).filter(([name]) => name.includes(wanted))) {
+        const began = Date.now();
+        ran += 1;
+        try {
+          const says = await test(...args);
+          console.log(`ok    ${name} (${((Date.now() - began) / 1000).toFixed(1)} s)${says ? `: ${says}` : ''}`);
+        } catch (error) {
+          failed += 1;
+          console.log(`FAIL  ${name}\n${error.stack}`);
+        }
+      }
+    },
+    end() {
+      if (ran === 0) console.log(`FAIL  no test has ${wanted} in its name`);
+      process.exitCode = failed > 0 || ran === 0 ? 1 : 0;
+    },
+  };
 }
