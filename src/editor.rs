@@ -9,6 +9,7 @@
 pub mod ab_comparison;
 mod alteration_editor;
 mod blind_comparison_view;
+mod body_shape;
 mod breath_meter;
 mod breath_view;
 mod chart;

@@ -3,14 +3,11 @@
 
 use egui::{Align2, Color32, CornerRadius, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
+use crate::editor::body_shape::BodyShape;
 use crate::editor::chart;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
-
-/// Thickness of the wood where no hole gives it, m, and at the rim of the bell.
-const WALL_M: f64 = 7e-3;
-const RIM_M: f64 = 2.5e-3;
 
 /// A ruler of ten centimetres.
 pub(super) fn ruler(painter: &Painter, c: &Colours, area: Rect, scale: f32) {
@@ -94,10 +91,7 @@ pub(super) struct ClarinetDrawing<'a> {
     axis: f32,
     /// Points per metre.
     pub(super) scale: f32,
-    wall_m: f64,
-    length_m: f64,
-    last_hole_m: f64,
-    widest_m: f64,
+    shape: BodyShape,
 }
 
 /// A hole on the screen.
@@ -111,18 +105,13 @@ pub(super) struct HolePlace {
 
 impl<'a> ClarinetDrawing<'a> {
     pub(super) fn new(file: &'a InstrumentFile, area: Rect) -> Self {
-        let length_m = file.length_m();
-        let mut depths: Vec<f64> = file.holes.iter().map(|hole| hole.chimney_m).collect();
-        depths.sort_by(f64::total_cmp);
-        let wall_m = depths.get(depths.len() / 2).copied().unwrap_or(WALL_M);
-        let last_hole_m = file.holes.iter().map(|hole| hole.x_m).fold(0.0, f64::max);
-        let widest_m = file.bore.iter().map(|s| s.r_start_m.max(s.r_end_m)).fold(0.0, f64::max) + RIM_M;
-        let by_width = area.width() / length_m as f32;
+        let shape = BodyShape::new(file);
+        let by_width = area.width() / shape.length_m as f32;
         // A short, wide instrument takes at most half of the height.
-        let scale = by_width.min(0.5 * area.height() / (2.0 * widest_m) as f32);
-        let left = area.left() + 0.5 * (area.width() - scale * length_m as f32);
+        let scale = by_width.min(0.5 * area.height() / (2.0 * shape.widest_m) as f32);
+        let left = area.left() + 0.5 * (area.width() - scale * shape.length_m as f32);
         let axis = area.top() + 0.50 * area.height();
-        Self { file, left, axis, scale, wall_m, length_m, last_hole_m, widest_m }
+        Self { file, left, axis, scale, shape }
     }
 
     pub(super) fn x(&self, x_m: f64) -> f32 {
@@ -130,15 +119,7 @@ impl<'a> ClarinetDrawing<'a> {
     }
 
     pub(super) fn top(&self) -> f32 {
-        self.axis - self.scale * self.widest_m as f32
-    }
-
-    /// Radius of the outside, m.
-    fn outside_m(&self, x_m: f64, bore_m: f64) -> f64 {
-        let beak = (x_m / 0.06).clamp(0.15, 1.0);
-        let from_hole =
-            ((x_m - self.last_hole_m) / (self.length_m - self.last_hole_m).max(1e-6)).clamp(0.0, 1.0);
-        bore_m + beak * (self.wall_m + (RIM_M - self.wall_m) * from_hole.sqrt())
+        self.axis - self.scale * self.shape.widest_m as f32
     }
 
     pub(super) fn paint(&self, painter: &Painter, c: &Colours, wave: &[(f32, f32)]) {
@@ -156,7 +137,7 @@ impl<'a> ClarinetDrawing<'a> {
                 [(segment.x_start_m, segment.r_start_m, false), (segment.x_end_m, segment.r_end_m, true)]
             {
                 let (x, bore) = (self.x(x_m), self.scale * r_m as f32);
-                let out = self.scale * self.outside_m(x_m, r_m) as f32;
+                let out = self.scale * self.shape.around_bore_m(x_m, r_m) as f32;
                 for (edge, along) in edges.iter_mut().zip([-out, -bore, bore, out]) {
                     edge.push(pos2(x, self.axis + along));
                 }
@@ -199,7 +180,7 @@ impl<'a> ClarinetDrawing<'a> {
     /// Place of the joint below a part, over all of the body.
     pub(super) fn joint(&self, part: &str) -> Option<Rect> {
         let x_m = self.file.joint_x_m(part)?;
-        let out = self.scale * self.outside_m(x_m, self.file.radius_at(x_m)) as f32 + 1.5;
+        let out = self.scale * self.shape.around_bore_m(x_m, self.file.radius_at(x_m)) as f32 + 1.5;
         Some(Rect::from_center_size(pos2(self.x(x_m), self.axis), vec2(4.0, 2.0 * out)))
     }
 
@@ -207,8 +188,8 @@ impl<'a> ClarinetDrawing<'a> {
     fn parts(&self, painter: &Painter, c: &Colours) {
         for pair in self.file.bore.windows(2).filter(|pair| pair[0].part != pair[1].part) {
             let x = self.x(pair[0].x_end_m);
-            let out =
-                self.scale * self.outside_m(pair[0].x_end_m, pair[0].r_end_m.max(pair[1].r_start_m)) as f32;
+            let out = self.scale
+                * self.shape.around_bore_m(pair[0].x_end_m, pair[0].r_end_m.max(pair[1].r_start_m)) as f32;
             for side in [-1.0_f32, 1.0] {
                 let bore = self.scale * pair[0].r_end_m as f32;
                 let ring = Rect::from_two_pos(
@@ -225,7 +206,7 @@ impl<'a> ClarinetDrawing<'a> {
         let x = self.x(hole.x_m);
         let half = (self.scale * hole.radius_m as f32).max(1.5);
         let bore_m = self.file.radius_at(hole.x_m);
-        let outside = self.scale * (bore_m + hole.chimney_m.max(self.wall_m)) as f32;
+        let outside = self.scale * (bore_m + hole.chimney_m.max(self.shape.wall_m)) as f32;
         let inside = self.scale * bore_m as f32;
         let rect = Rect::from_two_pos(
             pos2(x - half, self.axis + out * inside),

@@ -12,6 +12,7 @@ use super::lit_body::{band, glow, lit, plate, shadow, turned};
 use super::motion::Motion;
 use crate::editor::Action;
 use crate::editor::alteration_editor::{AlterationEditor, Altered};
+use crate::editor::body_shape::{BEAK_M, BodyShape};
 use crate::editor::chart;
 use crate::editor::clarinet_view;
 use crate::editor::hole_names::hole_title;
@@ -20,15 +21,10 @@ use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 
-/// Thickness of the wood where no hole gives it, and at the rim of the bell, m.
-const WALL_M: f64 = 7e-3;
-const RIM_M: f64 = 2.5e-3;
 /// The body is at least this thick over its length on the screen, or it would be a line in a small window.
 const LEAST_THICKNESS: f32 = 0.056;
 /// Most that the thickness is exaggerated.
 const MOST_EXAGGERATED: f32 = 2.4;
-/// Length of a mouthpiece's beak, m (drawn only).
-const BEAK_M: f64 = 0.055;
 /// Steps along the bore that the outline has.
 const STATIONS: usize = 160;
 /// How far a finger or pad lifts, points.
@@ -127,38 +123,20 @@ struct Body<'a> {
     /// Points per metre, along and across.
     scale: f32,
     across: f32,
-    length_m: f64,
-    wall_m: f64,
-    last_hole_m: f64,
-    widest_m: f64,
+    shape: BodyShape,
 }
 
 impl<'a> Body<'a> {
     fn new(file: &'a InstrumentFile, rect: Rect) -> Self {
-        let length_m = file.length_m();
-        let mut depths: Vec<f64> = file.holes.iter().map(|hole| hole.chimney_m).collect();
-        depths.sort_by(f64::total_cmp);
-        let wall_m = depths.get(depths.len() / 2).copied().unwrap_or(WALL_M).clamp(4e-3, 9e-3);
-        let last_hole_m = file.holes.iter().map(|hole| hole.x_m).fold(0.0, f64::max);
-        let widest_m = file.bore.iter().map(|s| s.r_start_m.max(s.r_end_m)).fold(0.0, f64::max) + RIM_M;
+        let shape = BodyShape::new(file);
         let margin = (0.03 * rect.width()).clamp(16.0, 40.0);
-        let scale = (rect.width() - 2.0 * margin) / length_m as f32;
-        let thin = 2.0 * (file.nominal_radius_m + wall_m) / length_m;
+        let scale = (rect.width() - 2.0 * margin) / shape.length_m as f32;
+        let thin = 2.0 * (file.nominal_radius_m + shape.wall_m) / shape.length_m;
         let exaggerated = (LEAST_THICKNESS / thin as f32).clamp(1.0, MOST_EXAGGERATED);
         // The bell has at most half of the height.
-        let across = (scale * exaggerated).min(0.25 * rect.height() / widest_m as f32);
+        let across = (scale * exaggerated).min(0.25 * rect.height() / shape.widest_m as f32);
         let axis = rect.top() + 0.62 * rect.height();
-        Self {
-            file,
-            left: rect.left() + margin,
-            axis,
-            scale,
-            across,
-            length_m,
-            wall_m,
-            last_hole_m,
-            widest_m,
-        }
+        Self { file, left: rect.left() + margin, axis, scale, across, shape }
     }
 
     fn x(&self, x_m: f64) -> f32 {
@@ -166,7 +144,7 @@ impl<'a> Body<'a> {
     }
 
     fn length(&self) -> f32 {
-        self.scale * self.length_m as f32
+        self.scale * self.shape.length_m as f32
     }
 
     fn middle(&self) -> f32 {
@@ -175,16 +153,13 @@ impl<'a> Body<'a> {
 
     /// Diameter of the straight part.
     fn thickness(&self) -> f32 {
-        2.0 * self.across * (self.file.nominal_radius_m + self.wall_m) as f32
+        2.0 * self.across * (self.file.nominal_radius_m + self.shape.wall_m) as f32
     }
 
     /// Radius of the outside on the screen.
     fn outside(&self, x_m: f64) -> f32 {
-        let beak = (x_m / BEAK_M).clamp(0.12, 1.0);
-        let way = (x_m - self.last_hole_m) / (self.length_m - self.last_hole_m).max(1e-6);
-        let wall_m = self.wall_m + (RIM_M - self.wall_m) * way.clamp(0.0, 1.0).sqrt();
-        let bore_m = self.file.radius_at(x_m.min(self.length_m - 1e-9));
-        self.across * (beak * (bore_m + wall_m)) as f32
+        let bore_m = self.file.radius_at(x_m.min(self.shape.length_m - 1e-9));
+        self.across * self.shape.outside_m(x_m, bore_m) as f32
     }
 
     /// End of the part that the reed lies on, m.
@@ -197,8 +172,8 @@ impl<'a> Body<'a> {
     /// The sound pressure over the body, higher and lighter when it is loud.
     fn wave(&self, painter: &Painter, c: &Colours, wave: &[(f32, f32)], rect: Rect, loudness: f32) {
         // Straight, so that only pressure bends the line: above the keys and above the bell.
-        let body = self.outside(0.5 * self.length_m) + 18.0;
-        let foot = self.axis - body.max(self.across * self.widest_m as f32 + 4.0);
+        let body = self.outside(0.5 * self.shape.length_m) + 18.0;
+        let foot = self.axis - body.max(self.across * self.shape.widest_m as f32 + 4.0);
         let room = foot - rect.top() - 16.0;
         if wave.len() < 2 || room < 20.0 || loudness <= 0.0 {
             return;
@@ -221,7 +196,7 @@ impl<'a> Body<'a> {
             }
         }
         painter.add(mesh);
-        let ends = self.x(0.0)..=self.x(self.length_m);
+        let ends = self.x(0.0)..=self.x(self.shape.length_m);
         painter.hline(ends, foot, Stroke::new(1.0, c.breath.gamma_multiply(0.3)));
         painter.add(Shape::line(wave.iter().map(point).collect(), Stroke::new(2.0, c.breath)));
         if room > 60.0 {
@@ -237,7 +212,7 @@ impl<'a> Body<'a> {
         let colour = |x_m: f64| if x_m < mouthpiece_m { ebonite } else { c.wood };
         // Two stations at the end of the mouthpiece, so that its colour ends sharply.
         let mut places: Vec<f64> =
-            (0..=STATIONS).map(|n| self.length_m * n as f64 / STATIONS as f64).collect();
+            (0..=STATIONS).map(|n| self.shape.length_m * n as f64 / STATIONS as f64).collect();
         places.extend([mouthpiece_m - 1e-6, mouthpiece_m + 1e-6, BEAK_M]);
         places.sort_by(f64::total_cmp);
         let stations: Vec<_> =
@@ -291,7 +266,7 @@ impl<'a> Body<'a> {
 
     /// The opening of the bell and its rim.
     fn bell(&self, painter: &Painter, c: &Colours) {
-        let (x, out) = (self.x(self.length_m), self.across * self.widest_m as f32);
+        let (x, out) = (self.x(self.shape.length_m), self.across * self.shape.widest_m as f32);
         let centre = pos2(x, self.axis);
         painter.add(Shape::ellipse_filled(centre, vec2(0.17 * out, out), c.metal));
         painter.add(Shape::ellipse_filled(
