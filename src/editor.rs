@@ -426,7 +426,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     }
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
         if is_blind {
-            blind_comparison_view::draw(ui, compare, &mut hands);
+            blind_comparison_view::draw(ui, compare, &mut hands, snapshot, &mut actions);
             return;
         }
         if presets.is_open {

@@ -39,7 +39,7 @@ pub struct Parameter {
     pub midi: &'static str,
     /// A host may automate it. What moves a motor is only the user's to move.
     pub is_automatable: bool,
-    /// Undo and the A/B comparison carry it. They leave out what acts, arms or plays.
+    /// Undo and the A/B comparison carry it. They leave out what acts, arms or plays; A/B carries the instrument, too.
     pub is_undoable: bool,
     /// A saved state brings its value back. Otherwise a loaded state always has the default.
     pub is_restored: bool,
@@ -183,7 +183,12 @@ impl Parameter {
     /// a host renders.
     pub fn is_in_presets(&self) -> bool {
         let is_status = matches!(self.kind, Kind::Status(_));
-        (self.is_undoable || self.id == "instr") && self.is_restored && !is_status && self.id != "qual"
+        self.is_compared() && self.is_restored && !is_status && self.id != "qual"
+    }
+
+    /// Whether the A/B comparison carries it: what undo carries, and the instrument.
+    pub fn is_compared(&self) -> bool {
+        self.is_undoable || self.id == "instr"
     }
 
     /// The default.

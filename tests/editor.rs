@@ -19,6 +19,8 @@ mod linked;
 mod looks;
 #[path = "editor/presets.rs"]
 mod presets;
+#[path = "editor/sides.rs"]
+mod sides;
 #[path = "editor/window.rs"]
 mod window;
 

@@ -2,13 +2,21 @@
 
 use egui::{Align2, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
 
-use crate::editor::ab_comparison::{AbComparison, ComparisonSide};
+use crate::editor::Action;
+use crate::editor::ab_comparison::AbComparison;
 use crate::editor::controls::Hands;
+use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
 /// Draws the page.
-pub fn draw(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands) {
+pub fn draw(
+    ui: &mut Ui,
+    compare: &mut AbComparison,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+    actions: &mut Vec<Action>,
+) {
     let c = Colours::here(ui);
     let height = ui.available_height();
     ui.vertical_centered(|ui| {
@@ -40,7 +48,7 @@ pub fn draw(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands) {
                 let ink = if is_here { c.on_accent } else { c.ink };
                 painter.text(rect.center(), Align2::CENTER_CENTER, name, FontId::proportional(44.0), ink);
                 if compare.is_revealed() {
-                    let told = if side == ComparisonSide::A { "is A" } else { "is B" };
+                    let told = format!("is {}", side.name());
                     let at = rect.center_bottom() - vec2(0.0, 10.0);
                     painter.text(at, Align2::CENTER_BOTTOM, told, theme::heading(), ink);
                 }
@@ -48,8 +56,7 @@ pub fn draw(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands) {
                     WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Side {name}"))
                 });
                 if response.clicked() {
-                    let values = compare.go(side, hands.setting());
-                    hands.restore(&values);
+                    compare.switch(side, hands, &snapshot.preset, actions);
                 }
             }
         });

@@ -10,6 +10,9 @@ use crate::editor::ab_comparison::Values;
 use crate::editor::terms;
 use crate::editor::undo::{Change, Step, UndoHistory};
 
+/// Two normalised values that are nearer than this are one: what a host's single precision loses.
+pub const SAME: f32 = 1e-6;
+
 pub use crate::editor::slider::slider;
 pub use crate::editor::widgets::{choice, handle, heading, momentary, segments, switch, teach};
 
@@ -207,7 +210,7 @@ impl Hands<'_> {
             .map(|&(id, after)| self.controls.look(id).map(|look| Change { id, before: look.value, after }));
         let changes: Vec<Change> = looks.flatten().collect();
         self.restore(&values);
-        self.history.record(Step { changes, preset: Some(preset) });
+        self.history.record(Step { changes, preset: Some(preset), copied_from: None });
     }
 
     /// Sets values that are no new step: undo, redo, A/B.
@@ -219,9 +222,9 @@ impl Hands<'_> {
         }
     }
 
-    /// Everything that belongs to a setting.
+    /// Everything that A and B carry.
     pub fn setting(&self) -> Values {
-        let ids = self.controls.ids().iter().filter(|id| terms::is_setting(id));
+        let ids = self.controls.ids().iter().filter(|id| terms::is_compared(id));
         ids.filter_map(|&id| Some((id, self.controls.look(id)?.value))).collect()
     }
 

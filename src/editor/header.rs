@@ -50,7 +50,7 @@ pub fn tools(
                 kept.is_dark = !kept.is_dark;
             }
             ui.add_space(4.0);
-            sides(ui, compare, hands, is_wide);
+            sides(ui, compare, hands, snapshot, actions, is_wide);
             ui.add_space(4.0);
             // Undo would tell what was set, and on which side.
             if !compare.is_blind() {
@@ -155,9 +155,10 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
 
 fn undo(ui: &mut Ui, hands: &mut Hands, actions: &mut Vec<Action>) {
     let name = |hands: &Hands, step: Option<&Step>| {
-        step.map(|Step { changes, preset }| match preset {
-            Some([_, chosen]) => format!("the choice of {chosen}"),
-            None => changes.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", "),
+        step.map(|Step { changes, preset, copied_from }| match (copied_from, preset) {
+            (Some(side), _) => format!("the copy of {}", side.name()),
+            (None, Some([_, chosen])) => format!("the choice of {chosen}"),
+            (None, None) => changes.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", "),
         })
     };
     let mut restore = |hands: &mut Hands, Restored { values, preset }: Restored| {
@@ -183,16 +184,32 @@ fn undo(ui: &mut Ui, hands: &mut Hands, actions: &mut Vec<Action>) {
     });
 }
 
-fn sides(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands, is_wide: bool) {
+fn sides(
+    ui: &mut Ui,
+    compare: &mut AbComparison,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+    actions: &mut Vec<Action>,
+    is_wide: bool,
+) {
     if compare.is_blind() {
         let c = Colours::here(ui);
         ui.label(egui::RichText::new("blind").color(c.beats));
         return;
     }
-    let blind = ui.add_enabled(compare.differs(&hands.setting()), egui::Button::new("Blind"));
+    let now = hands.setting();
+    let why_not = if !compare.differs(&now) {
+        Some("Make A and B different first, then compare them blind")
+    } else if compare.differs_in_instrument(&now) {
+        Some("A and B are different instruments: the keys would tell which is which")
+    } else {
+        None
+    };
+    let blind = ui.add_enabled(why_not.is_none(), egui::Button::new("Blind"));
     let blind = blind
         .on_hover_text("Compare without knowing which is which: A and B appear as X and Y in random order");
-    if blind.on_disabled_hover_text("Make A and B different first, then compare them blind").clicked() {
+        compare.switch(compare.behind(true), hands, &snapshot.preset, actions);
+    if blind.on_disabled_hover_text(why_not.unwrap_or_default()).clicked() {
         compare.hide();
     }
     let (text, other) = match compare.side {
@@ -203,10 +220,10 @@ fn sides(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands, is_wide: bo
     };
     let copy = named(ui.button(text), &format!("Copy to {other}"));
     if copy.on_hover_text(format!("Copies the settings you hear now to {other}")).clicked() {
-        compare.copy(hands.setting());
+        compare.copy(hands, &snapshot.preset);
     }
-    for (side, name) in [(ComparisonSide::B, "B"), (ComparisonSide::A, "A")] {
-        let is_here = compare.side == side;
+    for side in [ComparisonSide::B, ComparisonSide::A] {
+        let (name, is_here) = (side.name(), compare.side == side);
         let button = egui::Button::selectable(is_here, format!(" {name} ")).frame_when_inactive(true);
         let response = ui.add(button);
         response.widget_info(|| {
@@ -214,8 +231,7 @@ fn sides(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands, is_wide: bo
         });
         if response.on_hover_text(format!("Setting {name}: change it, and switch between A and B")).clicked()
         {
-            let values = compare.go(side, hands.setting());
-            hands.restore(&values);
+            compare.switch(side, hands, &snapshot.preset, actions);
         }
     }
 }

@@ -1,11 +1,8 @@
 //! A preset and the controls: putting one on, making one of them, and whether they differ.
 
 use crate::editor::Action;
-use crate::editor::controls::{Controls, Hands};
+use crate::editor::controls::{Controls, Hands, SAME};
 use crate::presets::Preset;
-
-/// Two normalised values count as one: what a host's single precision loses.
-const SAME: f32 = 1e-6;
 
 /// Puts a preset on the controls in place of the one called `before`, as one step of undo, and says so.
 pub fn choose(preset: &Preset, before: &str, hands: &mut Hands, actions: &mut Vec<Action>) {

@@ -1,6 +1,9 @@
 //! Undo and redo of the changes made in this window.
 //! A step is a gesture: the parameters it changed, each with its value before and after. Changes by the host or by another
-//! controller are not recorded. Undoing sets a parameter to the value that it had at the start of the gesture.
+//! controller are not recorded. Undoing sets a parameter to the value that it had at the start of the gesture. A and B have a
+//! history each: undoing on one side leaves the other alone.
+
+use crate::editor::ab_comparison::ComparisonSide;
 
 /// Steps kept; some hours of work.
 const KEPT: usize = 200;
@@ -23,6 +26,8 @@ pub struct Step {
     pub changes: Vec<Change>,
     /// Name of the preset before and after it, if it chose one.
     pub preset: Option<[String; 2]>,
+    /// The side whose setting it has copied, if it has.
+    pub copied_from: Option<ComparisonSide>,
 }
 
 /// What undo or redo brings back.
@@ -65,7 +70,7 @@ impl UndoHistory {
         self.parts.push(Change { id, before, after });
         if self.open.is_empty() {
             let changes = std::mem::take(&mut self.parts);
-            self.record(Step { changes, preset: None });
+            self.record(Step { changes, ..Step::default() });
         }
     }
 
@@ -141,7 +146,8 @@ mod tests {
     fn a_preset_that_is_taken_back_takes_its_name_along() {
         let mut history = UndoHistory::default();
         let changes = vec![Change { id: "lip", before: 0.1, after: 0.2 }];
-        history.record(Step { changes, preset: Some(["Old".to_owned(), "New".to_owned()]) });
+        let preset = Some(["Old".to_owned(), "New".to_owned()]);
+        history.record(Step { changes, preset, copied_from: None });
         assert_eq!(history.undo().preset.as_deref(), Some("Old"));
         assert_eq!(history.redo().preset.as_deref(), Some("New"));
     }

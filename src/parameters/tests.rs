@@ -185,11 +185,29 @@ fn nothing_that_moves_a_motor_or_plays_travels_with_undo_or_is_automated() {
         let parameter = find(id).unwrap();
         assert!(!parameter.is_undoable && !parameter.is_automatable, "{id}");
     }
+    // The comparison takes the instrument along, and nothing else of these.
+    for id in ["arm", "ceil", "takeov", "rest", "blow", "rec", "replay", "knob", "breath", "panic", "side"] {
+        assert!(!find(id).unwrap().is_compared(), "{id}");
+    }
+    assert!(find("instr").unwrap().is_compared() && find("lip").unwrap().is_compared());
     assert!(!find("breath").unwrap().is_undoable && !find("panic").unwrap().is_undoable);
     for id in ["arm", "takeov", "rest", "blow", "rec", "miccal"] {
         assert!(!find(id).unwrap().is_restored, "{id} is never on in a loaded state");
     }
     assert!(find("no such").is_none());
+}
+
+/// What the window refuses is outside the range, not an end of it that lost its last bit on the way through its text.
+#[test]
+fn the_ends_of_every_range_are_read_back() {
+    for (parameter, number) in numbers() {
+        for end in [number.min, number.max, number.default] {
+            let text = parameter.text(Value::Number(end));
+            assert!(parameter.read(&text).is_ok(), "{}: {text}", parameter.id);
+        }
+        let beyond = parameter.text(Value::Number(number.max + (number.max - number.min)));
+        assert!(parameter.read(&beyond).is_err(), "{}: {beyond}", parameter.id);
+    }
 }
 
 #[test]

@@ -81,35 +81,6 @@ fn undo_and_redo_walk_through_gestures() {
 }
 
 #[test]
-fn a_and_b_keep_their_settings_and_blind_hides_them() {
-    let mut window = Window::tall(Tab::Reed);
-    click(&mut window, "Setting B");
-    window.host.automate("lip", 0.9);
-    window.host.automate("arm", 1.0);
-    window.harness.run();
-    click(&mut window, "Setting A");
-    assert_eq!((window.host.value("lip"), window.host.value("arm")), (0.5, 1.0), "arming is no setting");
-    click(&mut window, "Blind");
-    // Nothing tells: no slider, no curve.
-    assert!(window.harness.query_by_label("Lip opening").is_none());
-    assert!(window.harness.query_by_label("Undo").is_none());
-    assert!(window.harness.query_by_label_contains("Hz").is_none());
-    assert!(window.harness.query_by_label_contains("Pitch").is_none());
-    window.harness.get_by_label("Mouth pressure 3.00 kPa, ");
-    let heard: BTreeSet<String> = ["Side X", "Side Y"]
-        .into_iter()
-        .map(|side| {
-            click(&mut window, side);
-            window.host.value("lip").to_string()
-        })
-        .collect();
-    assert_eq!(heard.len(), 2, "X and Y are not the same");
-    click(&mut window, "Reveal");
-    click(&mut window, "Done");
-    window.harness.get_by_label("Lip opening");
-}
-
-#[test]
 fn keys_play_slur_and_let_go() {
     let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
     let keys = window.harness.get_by_label_contains("Keyboard").rect();

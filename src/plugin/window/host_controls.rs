@@ -10,7 +10,7 @@ use nice_plug::prelude::{ParamPtr, Params};
 
 use crate::controllers::ControllerLinks;
 use crate::controllers::source_curves::SourceCurves;
-use crate::editor::controls::Mark;
+use crate::editor::controls::{Mark, SAME};
 use crate::editor::{Controls, Look};
 use crate::parameters;
 use crate::plugin::host_link::MenuRequest;
@@ -19,8 +19,6 @@ use crate::plugin::params::ChalumeauParams;
 /// How long a value counts that was set and has not arrived. Hosts pass it on with the next block: two blocks of 8192 samples at
 /// 44.1 kHz are 0.4 s. One that never arrives was refused.
 const ARRIVES_WITHIN: Duration = Duration::from_millis(500);
-/// Values that are nearer than this are the same.
-const SAME: f32 = 1e-6;
 
 /// All parameters by their ids. `params` keeps the pointers valid.
 pub struct HostControls {
