@@ -45,6 +45,7 @@ pub mod theme;
 mod trial;
 pub mod undo;
 mod widgets;
+pub mod window_state;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -57,9 +58,9 @@ use serde::{Deserialize, Serialize};
 pub use ab_comparison::AbComparison;
 pub use controls::{Controls, Look};
 pub use feel_test::FeelTest;
-use note_names::NoteNames;
 pub use note_names::note_name;
 pub use snapshot::Snapshot;
+pub use window_state::{LEAST_SIZE, SIZE, WindowState, ZOOM};
 
 use chalumeau_core::bore::alterations::Alterations;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -74,13 +75,6 @@ use trial::Trial;
 use undo::UndoHistory;
 
 use crate::presets::Preset;
-
-/// Size the window opens with, points.
-pub const SIZE: (f32, f32) = (1100.0, 720.0);
-/// Least size that still shows everything, points.
-pub const LEAST_SIZE: (f32, f32) = (700.0, 480.0);
-/// Least and most zoom.
-pub const ZOOM: (f32, f32) = (0.5, 3.0);
 
 /// What the user did, other than changing a parameter.
 #[derive(Clone, Debug, PartialEq)]
@@ -480,55 +474,4 @@ fn beside<A>(
     });
     let rest = Frame::new().outer_margin(Margin { right: theme::GAP as i8, ..Margin::ZERO });
     CentralPanel::default().frame(rest).show(ui, |ui| picture(ui, with));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_a_project_keeps_survives_rubbish() {
-        let kept = WindowState {
-            size: (f32::NAN, 1e9),
-            zoom: -3.0,
-            is_dark: false,
-            tab: Tab::Sound,
-            ..WindowState::default()
-        }
-        .mended();
-        assert_eq!(
-            kept,
-            WindowState {
-                size: (SIZE.0, 8_000.0),
-                zoom: 0.5,
-                is_dark: false,
-                tab: Tab::Sound,
-                ..WindowState::default()
-            }
-        );
-        let text = toml::to_string(&kept).unwrap();
-        assert_eq!(toml::from_str::<WindowState>(&text).unwrap(), kept);
-        assert_eq!(toml::from_str::<WindowState>("").unwrap(), WindowState::default());
-    }
-
-    #[test]
-    fn a_musician_sees_no_laboratory_until_asked_and_old_projects_keep_their_view() {
-        let musician = WindowState::default();
-        assert!(musician.offers(Tab::Play, false) && !musician.offers(Tab::Reed, true));
-        assert!(!musician.offers(Tab::Knob, false) && musician.offers(Tab::Knob, true));
-        let old = toml::from_str::<WindowState>("tab = \"reed\"").unwrap().mended();
-        assert!(old.is_lab && Tab::ALL.iter().all(|&tab| old.offers(tab, false)));
-    }
-
-    #[test]
-    fn rounding_to_pixels_is_no_new_size() {
-        let mut kept = WindowState::default();
-        for zoom in [0.5, 0.75, 1.25, 1.5, 2.5, 3.0] {
-            let points = |size: f32| (size * zoom).round() / zoom;
-            kept.resized(points(SIZE.0), points(SIZE.1));
-            assert_eq!(kept, WindowState::default());
-        }
-        kept.resized(SIZE.0 + 20.0, SIZE.1);
-        assert_eq!(kept.size, (SIZE.0 + 20.0, SIZE.1));
-    }
 }

@@ -17,10 +17,8 @@ use crate::editor::snapshot::{Severity, Snapshot, Status};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::editor::undo::{Restored, Step};
+use crate::editor::window_state::{ZOOMS, has_room};
 use crate::editor::{Action, Tab, WindowState};
-
-/// Least and most zoom, and the steps offered.
-pub const ZOOMS: [f32; 8] = [0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
 
 /// The upper line.
 pub fn tools(
@@ -44,7 +42,7 @@ pub fn tools(
             ui.spacing_mut().item_spacing.x = 5.0;
             ui.spacing_mut().button_padding.x = if is_wide { 8.0 } else { 6.0 };
             momentary(ui, hands, "panic", "Panic");
-            zoom(ui, kept);
+            zoom(ui, kept, snapshot.room);
             let word = if kept.is_dark { "Light theme" } else { "Dark theme" };
             if icon(ui, Icon::Theme, word).on_hover_text(word).clicked() {
                 kept.is_dark = !kept.is_dark;
@@ -236,12 +234,13 @@ fn sides(
     }
 }
 
-fn zoom(ui: &mut Ui, kept: &mut WindowState) {
+fn zoom(ui: &mut Ui, kept: &mut WindowState, room: Option<(f32, f32)>) {
     let text = format!("{:.0} %", 100.0 * kept.zoom);
     // High enough for all of them.
     let list = egui::ComboBox::from_id_salt("zoom").width(64.0).height(300.0).selected_text(&text);
     let shown = list.show_ui(ui, |ui| {
-        for zoom in ZOOMS {
+        let now = kept.zoom;
+        for zoom in ZOOMS.into_iter().filter(|&zoom| has_room(zoom, room) || zoom == now) {
             ui.selectable_value(&mut kept.zoom, zoom, format!("{:.0} %", 100.0 * zoom));
         }
     });
@@ -250,7 +249,9 @@ fn zoom(ui: &mut Ui, kept: &mut WindowState) {
         info.current_text_value = Some(text.clone());
         info
     });
-    shown.response.on_hover_text("Size of everything in this window; saved with the project");
+    shown.response.on_hover_text(
+        "Size of everything in this window, as large as the screen has room for; saved with the project",
+    );
 }
 
 /// The lower line. Whether a tab was clicked.

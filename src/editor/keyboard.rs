@@ -51,6 +51,11 @@ impl Keyboard {
         self.letters = Some(TypedLetters::default());
     }
 
+    /// Whether letters play: then no host has the other keys.
+    pub fn has_letters(&self) -> bool {
+        self.letters.is_some()
+    }
+
     /// Draws the keys, and says what they play. `is_text`: letters are text now.
     pub fn draw(
         &mut self,

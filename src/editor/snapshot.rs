@@ -105,6 +105,8 @@ pub struct Snapshot {
     pub latency_ms: f32,
 }
 
+    /// The largest window that the screen has room for, points at 100 %; `None` if that is not known.
+    pub room: Option<(f32, f32)>,
 impl Default for Snapshot {
     fn default() -> Self {
         let instrument = Arc::new(InstrumentFile::built_in());
@@ -151,6 +153,7 @@ impl Default for Snapshot {
         }
     }
 }
+            room: None,
 
 impl Snapshot {
     /// The settings with the reed as the lip has it now.
@@ -249,6 +252,26 @@ pub struct BreathSource {
 /// Values at equal steps of time, oldest first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
+/// What the microphone does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum MicrophoneState {
+    /// It is switched off, or nothing plays.
+    #[default]
+    Off,
+    /// Exact zeros come in: nothing is connected.
+    Unconnected,
+    /// It measures the room.
+    Measuring {
+        /// Time left, s.
+        left_s: f32,
+    },
+    /// It listens for wind.
+    Listening {
+        /// Level of the room, dBFS.
+        floor_dbfs: f32,
+    },
+}
+
     /// Between two values, s.
     pub step_s: f32,
     /// Mouth pressure, kPa.

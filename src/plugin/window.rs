@@ -20,6 +20,8 @@ mod instrument_analysis;
 #[cfg(test)]
 mod parameters_match_tests;
 mod snapshot_thread;
+mod screen;
+mod size_watch;
 mod window_audio;
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};

@@ -495,6 +495,64 @@ fn the_laboratory_is_offered_when_asked_for() {
     assert_eq!(window.harness.state().kept.tab, Tab::Play, "a hidden view is not in front");
 }
 
+/// MIDI ports and the entry for OSC are in the list of every system.
+#[test]
+fn what_may_be_a_knob_does_not_offer_a_musician_its_view() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    window.host.automate("knob", 0.0);
+    let has_tab = |window: &mut Window| {
+        window.harness.run();
+        window.harness.query_by_role_and_label(Role::Tab, "Knob").is_some()
+    };
+    assert!(has_tab(&mut window));
+    window.snapshot.borrow_mut().knob.is_live = false;
+    assert!(has_tab(&mut window), "a simulated knob is one");
+    window.snapshot.borrow_mut().knob.devices.iter_mut().for_each(|device| device.is_knob = false);
+    assert!(!has_tab(&mut window));
+}
+
+#[test]
+fn a_long_status_line_has_one_tip() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    let text = "Chalumeau sim 5eed0001 at /dev/pts/3, ".repeat(6);
+    window.snapshot.borrow_mut().status[0].text = text.clone();
+    window.harness.run();
+    window.harness.get_by_label(&text).hover();
+    window.harness.run_steps(60);
+    // The line itself, and the tip.
+    assert_eq!(window.harness.get_all_by_label(&text).count(), 2);
+}
+
+#[test]
+fn sizes_that_the_screen_has_no_room_for_are_not_offered() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    for (room, has_large) in [(None, true), (Some((1_900.0, 990.0)), false)] {
+        window.snapshot.borrow_mut().room = room;
+        window.harness.run();
+        window.harness.get_by_role_and_label(Role::ComboBox, "Zoom").click();
+        window.harness.run();
+        window.harness.get_by_label("200 %");
+        assert_eq!(window.harness.query_by_label("300 %").is_some(), has_large);
+        window.harness.key_press(Key::Escape);
+        window.harness.run();
+    }
+}
+
+#[test]
+fn control_and_0_bring_the_size_back_in_a_window_without_a_host() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    for (has_letters, zoom) in [(false, 3.0), (true, 1.0)] {
+        window.harness.state_mut().kept.zoom = 3.0;
+        if has_letters {
+            let state = std::mem::take(window.harness.state_mut());
+            *window.harness.state_mut() = state.with_letters();
+        }
+        window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::Num0);
+        window.harness.run();
+        assert_eq!(window.harness.state().kept.zoom, zoom);
+    }
+}
+
 #[test]
 fn looking_changes_nothing_that_a_project_keeps() {
     for tab in Tab::ALL {

@@ -145,6 +145,11 @@ impl Screen {
         look.is_some_and(|look| look.map_state == MapState::VIEWABLE)
     }
 
+    /// The size of the screen, pixels.
+    pub fn whole(&self) -> Result<(u32, u32)> {
+        self.size(self.root)
+    }
+
     /// Width and height of a window.
     pub fn size(&self, window: Window) -> Result<(u32, u32)> {
         let found = self.connection.get_geometry(window)?.reply()?;

@@ -68,6 +68,11 @@ impl Running {
     fn interrupt(&mut self) -> ExitStatus {
         let asked = Command::new("sh").args(["-c", &format!("kill -INT {}", self.child.id())]).status();
         assert!(asked.unwrap().success());
+        self.ended()
+    }
+
+    /// Waits for its end.
+    fn ended(&mut self) -> ExitStatus {
         let began = Instant::now();
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
@@ -267,13 +272,44 @@ fn its_window_plays_and_closing_it_is_the_end() {
     screen.press(false).unwrap();
     assert!(sounding.differing(&still) > 1_000, "nothing sounds");
     screen.ask_to_close(window).unwrap();
-    let began = Instant::now();
-    let status = loop {
-        if let Some(status) = running.child.try_wait().unwrap() {
-            break status;
-        }
-        assert!(began.elapsed() < PATIENCE, "still running");
-        std::thread::sleep(Duration::from_millis(20));
-    };
+    let status = running.ended();
     assert!(status.success(), "{status}");
+}
+
+/// A size that was chosen on a larger screen, at which 1100 by 720 points would be 3300 by 2160 pixels.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "needs a display"]
+fn its_window_is_no_larger_than_the_screen() {
+    let home = tempfile::tempdir().unwrap();
+    let start = |display: Option<&str>| {
+        let mut command = program();
+        command.args(["--backend", "dummy"]).env("CHALUMEAU_DATA_DIR", home.path());
+        Running::spawn(command.envs(display.map(|display| ("DISPLAY", display))))
+    };
+    let mut first = start(None);
+    first.wait();
+    assert!(first.interrupt().success());
+    let path = home.path().join("chalumeau/session.json");
+    let kept = std::fs::read_to_string(&path).unwrap();
+    let large = kept.replace(r#"\"zoom\":1.0"#, r#"\"zoom\":3.0"#);
+    assert_ne!(large, kept, "{kept}");
+    std::fs::write(&path, large).unwrap();
+
+    let display = std::env::var("DISPLAY").unwrap();
+    let screen = chalumeau_test_host::screen::Screen::open(Some(&display)).unwrap();
+    let mut running = start(Some(&display));
+    let window = screen.titled("Chalumeau").unwrap();
+    screen.settled(window, Duration::from_millis(600)).unwrap();
+    let (width, height) = screen.size(window).unwrap();
+    let (room_width, room_height) = screen.whole().unwrap();
+    assert!(width <= room_width && height <= room_height, "{width} by {height}");
+    assert!(2 * width > room_width && 2 * height > room_height, "{width} by {height}: as large as it may be");
+    let picture = screen.picture(window).unwrap();
+    picture.write(&chalumeau_test_host::machine::target().join("screenshots/standalone-large.png")).unwrap();
+    // The size that the user had chosen is not lost.
+    screen.ask_to_close(window).unwrap();
+    assert!(running.ended().success());
+    let after = std::fs::read_to_string(&path).unwrap();
+    assert!(after.contains(r#"\"size\":[1100.0,720.0]"#), "{after}");
 }

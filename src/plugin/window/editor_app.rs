@@ -2,6 +2,7 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 use nice_plug::context::gui::GuiContext;
 use nice_plug_egui::baseview::{HandlerError, WindowSize};
@@ -9,7 +10,8 @@ use nice_plug_egui::{Frame, KeyCapture, NiceEguiApp};
 
 use super::file_tasks::FileTask;
 use super::host_controls::HostControls;
-use super::{SharedWindow, kept};
+use super::size_watch::{Seen, SizeWatch};
+use super::{SharedWindow, kept, screen};
 use crate::editor::{self, Action, Controls, EditorState, Snapshot, WindowState};
 use crate::plugin::SharedHandles;
 use crate::plugin::launch_options::LaunchOptions;
@@ -34,6 +36,10 @@ pub struct WindowMemory {
     keys: rtrb::Producer<Event>,
     /// Pixels per point without zoom, on the latest screen.
     pub(super) scale: f64,
+    /// The largest window that the screen has room for, once the screen was asked.
+    room: Option<Option<(f32, f32)>>,
+    /// Size of the open window once it has come to rest, points.
+    shown: Option<(f32, f32)>,
 }
 
 impl WindowMemory {
@@ -50,6 +56,24 @@ impl WindowMemory {
             handles,
             keys,
             scale: 1.0,
+            room: None,
+            shown: None,
+        }
+    }
+
+    /// Size without zoom in points and zoom, of the open window or of one that opens now.
+    pub(super) fn measures(&mut self) -> ((f32, f32), f32) {
+        let room = *self.room.get_or_insert_with(|| screen::room(None));
+        let kept = kept(&self.handles.params);
+        (self.shown.unwrap_or_else(|| kept.fitted_size(room)), kept.zoom)
+    }
+
+    /// Asks the screen before a window opens. A zoom from a larger screen, at which a window would not fit, becomes less.
+    pub(super) fn open_on_screen(&mut self, fallback_scale: Option<f64>) {
+        let room = screen::room(fallback_scale);
+        (self.room, self.shown) = (Some(room), None);
+        if let Ok(mut kept) = self.handles.params.window.write() {
+            kept.zoom = kept.fitted_zoom(room);
         }
     }
 
@@ -160,14 +184,19 @@ pub struct EditorApp {
     memory: Arc<Mutex<WindowMemory>>,
     gui: GuiContext,
     has_drawn: bool,
+    size: SizeWatch,
 }
 
 impl EditorApp {
     pub(super) fn open(shared: Arc<SharedWindow>, memory: Arc<Mutex<WindowMemory>>, gui: GuiContext) -> Self {
         shared.is_open.store(true, Ordering::Relaxed);
         // A host that sleeps would show an old picture, and hear no key of the window.
-        memory.lock().unwrap_or_else(PoisonError::into_inner).handles.params.host.wake();
-        Self { shared, memory, gui, has_drawn: false }
+        let zoom = {
+            let memory = memory.lock().unwrap_or_else(PoisonError::into_inner);
+            memory.handles.params.host.wake();
+            kept(&memory.handles.params).zoom
+        };
+        Self { shared, memory, gui, has_drawn: false, size: SizeWatch::new(zoom, Instant::now()) }
     }
 }
 
@@ -175,7 +204,9 @@ impl Drop for EditorApp {
     fn drop(&mut self) {
         self.shared.is_open.store(false, Ordering::Relaxed);
         self.shared.set_drawn(None);
-        self.memory.lock().unwrap_or_else(PoisonError::into_inner).close(&self.shared, &self.gui);
+        let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
+        memory.shown = None;
+        memory.close(&self.shared, &self.gui);
     }
 }
 
@@ -193,11 +224,17 @@ impl NiceEguiApp for EditorApp {
         let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = &mut *memory;
         let params = memory.handles.params.clone();
+        let room = memory.room.flatten();
+        let resize = |ui: &egui::Ui, kept: &WindowState| {
+            let (width, height) = kept.fitted_size(room);
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::InnerSize(egui::vec2(width, height)));
+        };
         let now = kept(&params);
         if now != memory.written {
-            // The host has loaded a project while the window is open.
-            let size = egui::vec2(now.size.0, now.size.1);
-            ui.ctx().send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
+            // The host has loaded a project, while the window is open or before.
+            resize(ui, &now);
+            self.size.settle(Instant::now());
+            memory.written = now.clone();
             memory.state.kept = now;
         }
         let loads = params.loads();
@@ -216,6 +253,7 @@ impl NiceEguiApp for EditorApp {
         let is_shown = snapshot.instrument_key == params.instrument.key();
         snapshot.alterations =
             if is_shown { params.alterations.of(&snapshot.instrument_key) } else { Arc::default() };
+        snapshot.room = room;
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {
@@ -234,7 +272,15 @@ impl NiceEguiApp for EditorApp {
             KeyCapture::IgnoreAll
         });
         let size = ui.ctx().content_rect().size();
-        memory.state.kept.resized(size.x, size.y);
+        let zoom = ui.ctx().zoom_factor();
+        let seen = self.size.look(zoom, (size.x, size.y), Instant::now());
+        match seen {
+            Seen::Zoomed => resize(ui, &memory.state.kept),
+            Seen::Dragged => memory.state.kept.resized(size.x, size.y, room),
+            Seen::Settling | Seen::Still => {}
+        }
+        let is_at_rest = seen == Seen::Still || seen == Seen::Dragged;
+        memory.shown = (is_at_rest && zoom == memory.state.kept.zoom).then_some((size.x, size.y));
         let now = memory.state.kept.clone().mended();
         if memory.written != now
             && let Ok(mut kept) = params.window.write()

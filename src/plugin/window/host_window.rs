@@ -14,9 +14,9 @@ use nice_plug_egui::{
     EguiEditorHandle, EguiEditorState, EguiNiceSettings, RepaintNotifier, create_egui_editor,
 };
 
+use super::SharedWindow;
 use super::editor_app::{EditorApp, WindowMemory};
-use super::{SharedWindow, kept};
-use crate::editor::LEAST_SIZE;
+use crate::editor::{LEAST_SIZE, ZOOM};
 use crate::identity;
 use crate::plugin::launch_options::LaunchOptions;
 
@@ -40,9 +40,9 @@ impl HostWindow {
 
     /// Size without zoom in points, zoom, pixels per point without zoom.
     fn measures(&self) -> (LogicalSize<f32>, f32, f64) {
-        let memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = kept(&memory.handles.params);
-        (LogicalSize::new(kept.size.0, kept.size.1), kept.zoom, memory.scale)
+        let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
+        let ((width, height), zoom) = memory.measures();
+        (LogicalSize::new(width, height), zoom, memory.scale)
     }
 }
 
@@ -57,6 +57,7 @@ impl Editor for HostWindow {
         gui: GuiContext,
         host: Option<HostMethods>,
     ) -> Result<SpawnedEditor<Self::Handle>, Box<dyn Error>> {
+        self.memory.lock().unwrap_or_else(PoisonError::into_inner).open_on_screen(fallback_scale_factor);
         let (size, zoom, _) = self.measures();
         // The framework's state of the window lasts from opening to closing; the project keeps the rest.
         let state = EguiEditorState::from_size(size, zoom);
@@ -89,7 +90,8 @@ impl Editor for HostWindow {
     }
 
     fn resize_hint(&self) -> ResizeHint {
-        let min_size = Some(LogicalSize::new(LEAST_SIZE.0, LEAST_SIZE.1));
+        // At the least zoom: the system takes this number once, and the zoom may change while the window is open.
+        let min_size = Some(LogicalSize::new(ZOOM.0 * LEAST_SIZE.0, ZOOM.0 * LEAST_SIZE.1));
         ResizeHint {
             size_constraints: SizeConstraints::Logical { min_size, max_size: None },
             ..ResizeHint::resizable()

@@ -1,0 +1,97 @@
+//! Which sizes of the window are the user's. Those that follow from a zoom, from opening and from a host that refuses a size are
+//! not: a project must not keep them.
+
+use std::time::{Duration, Instant};
+
+/// How long after it has opened, or has got another zoom, a window comes to its size. A host may answer late.
+const SETTLES_WITHIN: Duration = Duration::from_secs(1);
+/// Sizes that are nearer than this are one, points: pixels are whole.
+const SAME: f32 = 2.0;
+
+/// What a frame has seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen {
+    /// The zoom is another than in the frame before: the window now needs its size.
+    Zoomed,
+    /// The window comes to a size that was asked for.
+    Settling,
+    /// Nothing has changed.
+    Still,
+    /// The user has dragged the window to this size.
+    Dragged,
+}
+
+/// Watches zoom and size.
+#[derive(Clone, Copy, Debug)]
+pub struct SizeWatch {
+    zoom: f32,
+    size: (f32, f32),
+    since: Instant,
+}
+
+impl SizeWatch {
+    /// Of a window that opens with a zoom.
+    pub fn new(zoom: f32, now: Instant) -> Self {
+        Self { zoom, size: (0.0, 0.0), since: now }
+    }
+
+    /// A size has been asked for.
+    pub fn settle(&mut self, now: Instant) {
+        self.since = now;
+    }
+
+    /// Sees the zoom and the size in points of a frame.
+    pub fn look(&mut self, zoom: f32, size: (f32, f32), now: Instant) -> Seen {
+        let before = std::mem::replace(&mut self.size, size);
+        if std::mem::replace(&mut self.zoom, zoom) != zoom {
+            self.settle(now);
+            return Seen::Zoomed;
+        }
+        let is_same = (before.0 - size.0).abs() <= SAME && (before.1 - size.1).abs() <= SAME;
+        if now.duration_since(self.since) < SETTLES_WITHIN {
+            Seen::Settling
+        } else if is_same {
+            // Slow drags add up.
+            self.size = before;
+            Seen::Still
+        } else {
+            Seen::Dragged
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (f32, f32) = (1_100.0, 720.0);
+
+    /// A system that lets no window be smaller than 700 by 480 pixels: at 50 % it is larger than asked.
+    #[test]
+    fn a_zoom_brings_sizes_that_are_not_the_users() {
+        let began = Instant::now();
+        let at = |ms: u64| began + Duration::from_millis(ms);
+        let mut watch = SizeWatch::new(1.0, began);
+        assert_eq!(watch.look(1.0, SIZE, at(10)), Seen::Settling, "as it has opened");
+        assert_eq!(watch.look(1.0, SIZE, at(2_000)), Seen::Still);
+        assert_eq!(watch.look(0.5, (2_200.0, 1_440.0), at(2_010)), Seen::Zoomed);
+        assert_eq!(watch.look(0.5, (1_400.0, 960.0), at(2_050)), Seen::Settling);
+        assert_eq!(watch.look(0.5, (1_400.0, 960.0), at(4_000)), Seen::Still);
+        assert_eq!(watch.look(1.0, (700.0, 480.0), at(4_010)), Seen::Zoomed);
+        assert_eq!(watch.look(1.0, SIZE, at(4_050)), Seen::Settling);
+        assert_eq!(watch.look(1.0, SIZE, at(6_000)), Seen::Still);
+    }
+
+    #[test]
+    fn what_the_user_drags_is_the_users_however_slowly() {
+        let began = Instant::now();
+        let mut watch = SizeWatch::new(1.0, began);
+        watch.look(1.0, SIZE, began);
+        let later = began + 2 * SETTLES_WITHIN;
+        let drag = |watch: &mut SizeWatch, by: f32| watch.look(1.0, (SIZE.0 + by, SIZE.1), later);
+        assert_eq!(drag(&mut watch, 1.5), Seen::Still, "rounding to pixels");
+        assert_eq!(drag(&mut watch, 3.0), Seen::Dragged);
+        watch.settle(later);
+        assert_eq!(drag(&mut watch, 300.0), Seen::Settling, "a project was loaded");
+    }
+}
