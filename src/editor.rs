@@ -391,7 +391,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     if ui.input(|input| input.key_pressed(egui::Key::Escape)) {
         linked_controllers::end_learning(&hands);
     }
-    breath.look(&snapshot.sources);
+    breath.look(&snapshot.sources, ui.input(|input| input.time));
     trial.keep_to(snapshot, &mut actions);
     let has_knob = snapshot.knob.is_live || !snapshot.knob.devices.is_empty() || hands.step("knob") > 0;
 

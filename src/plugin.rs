@@ -321,6 +321,7 @@ impl Chalumeau {
         }
         if let Some((_, window)) = &self.window {
             window.send_output([left, others.first().map_or(left, |right| right)]);
+            window.send_microphone(self.microphone.state());
         }
         let is_watched = self.window.as_ref().is_some_and(|(_, window)| window.is_open());
         self.params.fall_back();

@@ -9,6 +9,30 @@ use crate::editor::theme::Colours;
 /// Top of the scale of a blind comparison, kPa: the same for every setting.
 const BLIND_FULL_KPA: f32 = 10.0;
 
+/// Height of a line of small text, points.
+const LINE: f32 = 15.0;
+/// Height of a mark's two lines, points.
+const MARK: f32 = 26.0;
+
+/// Where the texts of marks stand, each with a line above its place and one below. `wanted`: the places of the marks, from the
+/// lowest on the screen to the highest. They move up where the mark below is too near, and down where they would pass `top`.
+fn text_places(wanted: &[f32], top: f32) -> Vec<f32> {
+    let mut below = f32::INFINITY;
+    let mut places: Vec<f32> = wanted
+        .iter()
+        .map(|&y| {
+            below = y.min(below - MARK);
+            below
+        })
+        .collect();
+    let mut least = top;
+    for place in places.iter_mut().rev() {
+        *place = place.max(least);
+        least = *place + MARK;
+    }
+    places
+}
+
 /// Top of every scale of mouth pressure, kPa: a little above what matters for this reed and note.
 pub fn full_kpa(snapshot: &Snapshot) -> f32 {
     let marks = snapshot.marks();
@@ -96,15 +120,12 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot, has_marks: bool) {
     painter.rect_filled(air, round, c.breath.gamma_multiply(0.85));
     painter.rect_stroke(scale, round, Stroke::new(1.0, c.line), egui::StrokeKind::Inside);
 
-    let mut lowest = f32::INFINITY;
-    for (at, name, colour) in marks(snapshot, c) {
-        if at > full || !has_marks {
-            continue;
-        }
+    let shown: Vec<_> = marks(snapshot, c).into_iter().filter(|mark| has_marks && mark.0 <= full).collect();
+    let wanted: Vec<f32> = shown.iter().map(|mark| y(mark.0)).collect();
+    // The upper line of the highest stays below the unit.
+    let places = text_places(&wanted, rect.top() + 24.0 + LINE + LINE);
+    for ((at, name, colour), text_y) in shown.into_iter().zip(places) {
         painter.hline(scale.left()..=scale.right() + 5.0, y(at), Stroke::new(1.5, colour));
-        // Each has two lines of text, which move up where the mark below is too near.
-        let text_y = y(at).min(lowest - 26.0);
-        lowest = text_y;
         let place = pos2(scale.right() + 8.0, text_y);
         painter.text(place, Align2::LEFT_BOTTOM, name, theme::small(), colour);
         painter.text(place - vec2(0.0, 1.0), Align2::LEFT_TOP, format!("{at:.2}"), theme::small(), c.quiet);
@@ -114,4 +135,19 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot, has_marks: bool) {
         WidgetInfo::labeled(Role::Meter, true, format!("Mouth pressure {kpa:.2} kPa, {word}"))
     });
     response.on_hover_text_at_pointer(format!("Mouth pressure, kilopascal.\n{LEGEND}"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_texts_of_marks_keep_clear_of_each_other_and_of_the_unit() {
+        assert_eq!(text_places(&[300.0, 200.0], 50.0), [300.0, 200.0], "where there is room");
+        for wanted in [&[45.0_f32][..], &[110.0, 100.0, 48.0, 44.0], &[310.0, 305.0, 300.0, 60.0]] {
+            let places = text_places(wanted, 54.0);
+            assert!(places.iter().all(|&place| place >= 54.0), "{places:?}");
+            assert!(places.windows(2).all(|pair| pair[0] - pair[1] >= MARK), "{places:?}");
+        }
+    }
 }

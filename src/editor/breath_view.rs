@@ -10,10 +10,11 @@ use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, momentary, slider, switch};
-use crate::editor::snapshot::{BreathSource, Snapshot};
+use crate::editor::snapshot::{BreathSource, MicrophoneState, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 use breath_curve::{BreathHistogram, OfSource};
+use chalumeau_core::control::wind::{LEAST_FLOOR_DBFS, MOST_FLOOR_DBFS, OVER_ROOM_DB};
 use chalumeau_core::instrument::BreathResponse;
 
 /// What the view remembers.
@@ -23,6 +24,8 @@ pub struct BreathView {
     ranges: [Option<(f32, f32)>; BreathInput::ALL.len()],
     /// What each source has sent while it was live.
     histograms: [BreathHistogram; BreathInput::ALL.len()],
+    /// When the sources were looked at last, s.
+    looked_s: Option<f64>,
     /// Least and greatest breath since *Calibrate* was pressed; none while it is not on. Both are `None` until the player blows.
     calibration: Option<Option<(f32, f32)>>,
 }
@@ -40,14 +43,17 @@ impl BreathView {
         );
     }
 
-    /// Updates the ranges of the sources.
-    pub fn look(&mut self, sources: &[BreathSource]) {
+    /// Updates the ranges and histograms of the sources, at a time in s.
+    pub fn look(&mut self, sources: &[BreathSource], now_s: f64) {
+        let passed_s =
+            self.looked_s.replace(now_s).map_or(0.0, |before_s| (now_s - before_s).max(0.0)) as f32;
+        self.histograms.iter_mut().for_each(|histogram| histogram.fade(passed_s));
         for source in sources.iter().filter(|source| source.is_seen) {
             let value = chart::share(source.value);
             let range = &mut self.ranges[source.input as usize];
             *range = Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))));
             if source.is_live {
-                self.histograms[source.input as usize].look(value);
+                self.histograms[source.input as usize].add(value, passed_s);
                 if let Some(range) = self.calibration.as_mut().filter(|_| value > 0.0) {
                     let (low, high) = range.unwrap_or((value, value));
                     *range = Some((low.min(value), high.max(value)));
@@ -57,6 +63,7 @@ impl BreathView {
     }
 
     fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+        let c = Colours::here(ui);
         heading(ui, "Breath sources");
         choice(ui, hands, "bfrom");
         let mut may_calibrate = snapshot.knob.is_live || hands.step("knob") > 0;
@@ -77,6 +84,9 @@ impl BreathView {
         heading(ui, "Microphone");
         switch(ui, hands, "mic");
         momentary(ui, hands, "miccal", "Measure the room");
+        let said = microphone_line(hands.step("mic") == 1, snapshot.microphone);
+        let ink = if said.1 { c.danger } else { c.quiet };
+        ui.label(egui::RichText::new(said.0).font(theme::small()).color(ink));
         heading(ui, "Response");
         choice(ui, hands, "resp");
         for id in ["breath", "bcurve"] {
@@ -84,7 +94,6 @@ impl BreathView {
         }
         if let Some(of) = OfSource::live(hands, snapshot).filter(OfSource::is_own) {
             let said = format!("{} has its own curve, in the picture.", of.title());
-            let c = Colours::here(ui);
             ui.label(egui::RichText::new(said).font(theme::small()).color(c.quiet));
         }
         if hands.step("resp") == PLAYED {
@@ -115,6 +124,24 @@ impl BreathView {
             slider(ui, hands, id);
         }
         linked_table::draw(ui, hands);
+    }
+}
+
+/// What the microphone does, in one line, and whether that asks for something.
+fn microphone_line(is_on: bool, state: MicrophoneState) -> (String, bool) {
+    match state {
+        _ if !is_on => ("Switch it on, then measure the room.".to_owned(), false),
+        MicrophoneState::Off => ("Waiting for the host to play.".to_owned(), false),
+        MicrophoneState::Unconnected => ("Nothing comes in: no microphone is connected.".to_owned(), true),
+        MicrophoneState::Measuring { left_s } => (format!("Keep quiet: {left_s:.1} s left."), false),
+        MicrophoneState::Listening { floor_dbfs } if floor_dbfs >= MOST_FLOOR_DBFS => {
+            ("The room is too loud to blow over it. Lower the gain, and measure again.".to_owned(), true)
+        }
+        MicrophoneState::Listening { floor_dbfs } => {
+            let below = if floor_dbfs <= LEAST_FLOOR_DBFS { " or less" } else { "" };
+            let softest = f64::from(floor_dbfs) + OVER_ROOM_DB;
+            (format!("Room: {floor_dbfs:.0} dB{below}. Blow louder than {softest:.0} dB."), false)
+        }
     }
 }
 
@@ -279,6 +306,9 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     response.on_hover_text_at_pointer(breath_meter::LEGEND);
 }
 
+/// Height of a word in a chart, points, with what the chart needs for its edge.
+const WORD_HEIGHT: f32 = 20.0;
+
 fn history(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let track = &snapshot.history;
@@ -290,13 +320,14 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
     }
     let full = f64::from(breath_meter::full_kpa(snapshot));
     let marks = breath_meter::marks(snapshot, c);
+    let height = ui.available_height();
     Chart {
         id: "breath history",
         x: (-seconds, 0.0),
         y: (0.0, full),
         x_name: "seconds ago",
         y_name: "mouth pressure, kPa",
-        height: ui.available_height(),
+        height,
         label: "Mouth pressure of the last seconds",
     }
     .show(ui, |plot| {
@@ -305,8 +336,9 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
                 egui_plot::HLine::new(name, f64::from(at)).color(colour).width(1.0).id(("mark", index));
             plot.hline(line.style(egui_plot::LineStyle::dashed_loose()).allow_hover(false));
             if f64::from(at) < full {
-                // "speaks" and "beats" are neighbours: one below its line, one above.
-                let anchor = if name == "speaks" { Align2::LEFT_TOP } else { Align2::LEFT_BOTTOM };
+                // "speaks" and "beats" are neighbours: one below its line, one above, where the chart has room above.
+                let is_high = (full - f64::from(at)) / full * f64::from(height) < f64::from(WORD_HEIGHT);
+                let anchor = if name == "speaks" || is_high { Align2::LEFT_TOP } else { Align2::LEFT_BOTTOM };
                 chart::word(plot, [-seconds, f64::from(at)], anchor, &format!(" {name}"), colour);
             }
         }
@@ -376,14 +408,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_microphone_says_what_it_does() {
+        let said = |state| microphone_line(true, state);
+        assert!(microphone_line(false, MicrophoneState::Unconnected).0.contains("Switch it on"));
+        assert!(said(MicrophoneState::Unconnected).0.contains("no microphone is connected"));
+        assert_eq!(said(MicrophoneState::Measuring { left_s: 1.25 }).0, "Keep quiet: 1.2 s left.");
+        let quiet = said(MicrophoneState::Listening { floor_dbfs: LEAST_FLOOR_DBFS });
+        assert_eq!(quiet, ("Room: -50 dB or less. Blow louder than -38 dB.".to_owned(), false));
+        let room = said(MicrophoneState::Listening { floor_dbfs: -41.4 });
+        assert_eq!(room.0, "Room: -41 dB. Blow louder than -29 dB.");
+        assert!(said(MicrophoneState::Listening { floor_dbfs: MOST_FLOOR_DBFS }).1, "too loud");
+    }
+
+    #[test]
     fn a_source_is_known_by_the_range_it_went_through() {
         let mut view = BreathView::default();
         let say =
             |value, is_seen| [BreathSource { input: BreathInput::Breath, value, is_live: false, is_seen }];
-        view.look(&say(0.0, false));
+        view.look(&say(0.0, false), 0.0);
         assert_eq!(view.ranges, [None; BreathInput::ALL.len()]);
         for value in [0.4, 0.1, 0.7, f32::NAN, 9.0] {
-            view.look(&say(value, true));
+            view.look(&say(value, true), 0.1);
         }
         assert_eq!(view.ranges[BreathInput::Breath as usize], Some((0.0, 1.0)));
         assert_eq!(view.ranges.iter().flatten().count(), 1);

@@ -82,6 +82,8 @@ pub struct Snapshot {
     pub settings: Settings,
     /// Where breath can come from.
     pub sources: Vec<BreathSource>,
+    /// What the microphone does.
+    pub microphone: MicrophoneState,
     /// The last seconds.
     pub history: Track,
     /// The inside of the mouthpiece, two periods of the lowest note or more.
@@ -103,10 +105,10 @@ pub struct Snapshot {
     pub knob: KnobState,
     /// Delay of the plugin, ms.
     pub latency_ms: f32,
-}
-
     /// The largest window that the screen has room for, points at 100 %; `None` if that is not known.
     pub room: Option<(f32, f32)>,
+}
+
 impl Default for Snapshot {
     fn default() -> Self {
         let instrument = Arc::new(InstrumentFile::built_in());
@@ -140,6 +142,7 @@ impl Default for Snapshot {
             requirement: None,
             settings: Settings::default(),
             sources: Vec::new(),
+            microphone: MicrophoneState::Off,
             history: Track::default(),
             scope: MouthpieceTraces::default(),
             heard: SoundAnalysis::default(),
@@ -249,9 +252,6 @@ pub struct BreathSource {
     pub is_seen: bool,
 }
 
-/// Values at equal steps of time, oldest first.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Track {
 /// What the microphone does.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MicrophoneState {
@@ -272,6 +272,9 @@ pub enum MicrophoneState {
     },
 }
 
+/// Values at equal steps of time, oldest first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Track {
     /// Between two values, s.
     pub step_s: f32,
     /// Mouth pressure, kPa.

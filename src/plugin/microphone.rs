@@ -7,6 +7,7 @@ use std::iter::Peekable;
 
 use super::params::ChalumeauParams;
 use super::params::moment::Moment;
+use crate::editor::snapshot::MicrophoneState;
 use chalumeau_core::control::wind::{WindCoeffs, WindDesign, WindMeter};
 use chalumeau_core::event::{Event, PartEvent, Timed};
 
@@ -78,6 +79,16 @@ impl Microphone {
     /// Whether it blows, or would if somebody did.
     pub fn is_blown(&self) -> bool {
         self.is_on && self.meter.as_ref().is_some_and(WindMeter::is_there)
+    }
+
+    /// What the window tells of it.
+    pub fn state(&self) -> MicrophoneState {
+        let Some(meter) = self.meter.as_ref().filter(|_| self.is_on) else { return MicrophoneState::Off };
+        match meter.calibration_left_s() {
+            _ if !meter.is_there() => MicrophoneState::Unconnected,
+            Some(left_s) => MicrophoneState::Measuring { left_s: left_s as f32 },
+            None => MicrophoneState::Listening { floor_dbfs: meter.design().floor_dbfs },
+        }
     }
 
     /// The breath now, 0..=1.

@@ -17,11 +17,12 @@ mod graphics_libraries;
 mod host_controls;
 mod host_window;
 mod instrument_analysis;
+mod microphone_cell;
 #[cfg(test)]
 mod parameters_match_tests;
-mod snapshot_thread;
 mod screen;
 mod size_watch;
+mod snapshot_thread;
 mod window_audio;
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -36,6 +37,7 @@ use crate::plugin::params::ChalumeauParams;
 use editor_app::WindowMemory;
 use file_tasks::FileTask;
 pub use host_window::HostWindow;
+use microphone_cell::MicrophoneCell;
 use snapshot_thread::SnapshotThread;
 pub use window_audio::WindowAudio;
 use window_audio::WindowChannels;
@@ -55,6 +57,7 @@ struct SharedWindow {
     stop: AtomicBool,
     /// Highest magnitude of the output since it was last read: the bits of a number that is not negative, which sort as it does.
     output_peak: AtomicU32,
+    microphone: MicrophoneCell,
 }
 
 impl SharedWindow {
@@ -120,6 +123,7 @@ impl PluginWindow {
             file_tasks: Mutex::default(),
             stop: AtomicBool::new(false),
             output_peak: AtomicU32::new(0),
+            microphone: MicrophoneCell::default(),
         });
         let (audio, WindowChannels { inside, sound, keys }) = WindowAudio::new(shared.clone());
         let snapshots = SnapshotThread::new(shared.clone(), handles.clone(), inside, sound);

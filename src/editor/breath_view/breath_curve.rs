@@ -18,12 +18,16 @@ use chalumeau_core::instrument::player::response::dynamic;
 const COLUMNS: usize = 128;
 /// Points of the curve.
 const POINTS: usize = 96;
-/// What is left of a column after each look, so that it shows the last half minute at 60 looks a second.
-const KEPT: f32 = 0.999;
+/// Time constant with which columns fade, s: after half a minute a twelfth is left.
+const FADES_S: f32 = 12.0;
+/// A look counts for this long at most, s: what the source has sent while nobody looked is not known.
+const LONGEST_S: f32 = 0.25;
+/// A source that has stayed at one value for this long makes its column as tall as any, s.
+const FULL_S: f32 = 0.5;
 /// Height of the tallest column over that of the chart.
 const TALLEST: f32 = 0.45;
 
-/// How often the live source has had each value.
+/// For how long the live source has had each value, s.
 #[derive(Clone, Debug)]
 pub struct BreathHistogram {
     columns: [f32; COLUMNS],
@@ -36,18 +40,23 @@ impl Default for BreathHistogram {
 }
 
 impl BreathHistogram {
-    /// Counts a value, 0..=1. Rest is not counted: it would hide all else.
-    pub fn look(&mut self, value: f32) {
-        self.columns.iter_mut().for_each(|column| *column *= KEPT);
+    /// So many seconds have passed.
+    pub fn fade(&mut self, passed_s: f32) {
+        let left = (-passed_s / FADES_S).exp();
+        self.columns.iter_mut().for_each(|column| *column *= left);
+    }
+
+    /// The source has had this value, 0..=1, for so many seconds. Rest is not counted: it would hide all else.
+    pub fn add(&mut self, value: f32, passed_s: f32) {
         let value = chart::share(value);
         if value > 0.0 {
-            self.columns[(value * (COLUMNS - 1) as f32).round() as usize] += 1.0;
+            self.columns[(value * (COLUMNS - 1) as f32).round() as usize] += passed_s.min(LONGEST_S);
         }
     }
 
     /// The columns over the tallest one, with their places, 0..=1.
     fn heights(&self) -> impl Iterator<Item = (f32, f32)> {
-        let tallest = self.columns.iter().copied().fold(1.0, f32::max);
+        let tallest = self.columns.iter().copied().fold(FULL_S, f32::max);
         let place = |at: usize| at as f32 / (COLUMNS - 1) as f32;
         self.columns.iter().enumerate().map(move |(at, &count)| (place(at), count / tallest))
     }
@@ -146,6 +155,13 @@ pub fn draw(
         let place = pos2(x(percent as f32 / 100.0), frame.bottom() + 23.0);
         painter.text(place, anchor, format!("{percent} %"), theme::small(), c.quiet);
     }
+    // The velocity of a key chooses the dynamic without the curve.
+    if let Some(dynamic) = snapshot.dynamic.filter(|_| live.is_none() && snapshot.sounding.is_some()) {
+        let at = y(chart::share(dynamic));
+        painter.hline(frame.x_range(), at, Stroke::new(1.5, c.breath));
+        let place = pos2(frame.left() + 6.0, at);
+        painter.text(place, Align2::LEFT_BOTTOM, "keys", theme::small(), c.breath);
+    }
     if let Some(breath) = breath.map(chart::share) {
         painter.vline(x(breath), y(level(breath, &settings))..=frame.bottom(), Stroke::new(1.0, c.breath));
         painter.circle_filled(at(breath), 5.0, c.breath);
@@ -158,7 +174,7 @@ pub fn draw(
     let painter = ui.painter();
     let speaks = pos2(x(softest), frame.bottom() + 11.0);
     painter.text(speaks + vec2(14.0, 2.0), Align2::LEFT_CENTER, "softest", theme::small(), c.speaks);
-    let word = "Drag the ends to what your controller sends when you play softest and loudest, and the middle to bend the curve. Blue: what it has sent.";
+    let word = "Drag the ends to what your controller sends when you play softest and loudest, and the middle to bend the curve. Blue: what it has sent. Keys play without the curve: a blue line shows how loud.";
     response.on_hover_text_at_pointer(word);
     let (end, to) = handle(ui, "Curve: where notes begin", speaks, "");
     let hand = Hand { of, id: "bsoft" };
@@ -243,13 +259,33 @@ mod tests {
     fn the_histogram_shows_what_was_played_and_not_the_rest() {
         let mut histogram = BreathHistogram::default();
         for value in [0.0, 0.0, 0.5, 0.5, f32::NAN, 1.0] {
-            histogram.look(value);
+            histogram.add(value, 0.1);
         }
         let seen: Vec<_> = histogram.heights().filter(|(_, height)| *height > 0.0).collect();
         assert_eq!(seen.len(), 2);
         assert!((seen[0].0 - 0.5).abs() < 0.01 && seen[1].0 == 1.0 && seen[0].1 > seen[1].1, "{seen:?}");
-        (0..20_000).for_each(|_| histogram.look(0.0));
+        histogram.fade(100.0);
         assert!(histogram.heights().all(|(_, height)| height < 1e-3), "it forgets");
+    }
+
+    #[test]
+    fn the_histogram_counts_time_however_often_it_looks() {
+        let after = |looks: usize| {
+            let mut histogram = BreathHistogram::default();
+            let step_s = 4.0 / looks as f32;
+            for value in [0.25, 0.75] {
+                for _ in 0..looks {
+                    histogram.fade(step_s);
+                    histogram.add(value, step_s);
+                }
+            }
+            histogram.columns
+        };
+        let (slow, fast) = (after(20), after(400));
+        assert!(slow.iter().zip(fast).all(|(slow, fast)| (slow - fast).abs() < 0.05), "{slow:?} {fast:?}");
+        let mut stalled = BreathHistogram::default();
+        stalled.add(0.5, 3_600.0);
+        assert!(stalled.columns.iter().sum::<f32>() <= LONGEST_S);
     }
 
     #[test]

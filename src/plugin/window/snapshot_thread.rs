@@ -138,6 +138,7 @@ impl SnapshotThread {
         self.show_instrument(&mut snapshot, current.as_ref(), inside.now.fingering);
         snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);
         snapshot.output_peak = f32::from_bits(self.shared.output_peak.swap(0, Ordering::Relaxed));
+        snapshot.microphone = self.shared.microphone.load();
         snapshot.hears_midi = self.hears_midi(inside.breath_sources.messages());
         let level_db = self.level_db(inside.host_rate_hz);
         self.history.extend(inside.now.mouth_kpa, level_db, snapshot.heard.f0_hz);
@@ -314,7 +315,10 @@ impl SnapshotThread {
             let (is_key_down, breath) = (inside.now.key.is_some(), sources.value(input).unwrap_or(0.0));
             if is_key_down && breath == 0.0 {
                 // Else a key that is silent would puzzle who has forgotten a controller.
-                add(Severity::Note, format!("no breath: {} is at 0", input.title()));
+                add(
+                    Severity::Note,
+                    format!("no breath: {} is at 0 (Panic gives it to the keys)", input.title()),
+                );
             } else {
                 add(Severity::Good, format!("breath: {}", input.title()));
             }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::SharedWindow;
+use crate::editor::snapshot::MicrophoneState;
 use crate::plugin::breath_sources::BreathSources;
 use crate::plugin::instrument_loading::InstrumentSwap;
 use chalumeau_core::event::Event;
@@ -108,6 +109,11 @@ impl WindowAudio {
             let highest = channels.into_iter().flatten().map(bits).fold(0, u32::max);
             self.shared.output_peak.fetch_max(highest, Ordering::Relaxed);
         }
+    }
+
+    /// Says what the microphone does. Real-time safe.
+    pub fn send_microphone(&self, state: MicrophoneState) {
+        self.shared.microphone.store(state);
     }
 
     /// Sends the sound and the inside of the instrument while the window is open. Real-time safe.

@@ -47,8 +47,9 @@ const MEAN_S: f64 = 0.015;
 const DEEP_S: f64 = 0.06;
 /// The breath may be so much louder than the wind below 90 Hz makes likely, dB: its power wanders.
 const SLACK_DB: f64 = 5.0;
-/// Level of the softest blow over the room, dB, and the least distance of the loudest from it.
-const OVER_ROOM_DB: f64 = 12.0;
+/// Level of the softest blow over the room, dB; the least distance of the loudest from it is as large.
+pub const OVER_ROOM_DB: f64 = 12.0;
+/// See [`OVER_ROOM_DB`].
 const LEAST_RANGE_DB: f64 = 12.0;
 /// What plays fortissimo until somebody has blown harder, dBFS.
 const LOUD_DBFS: f64 = -16.0;
@@ -178,6 +179,11 @@ impl WindMeter {
     /// Whether the room is being measured.
     pub fn is_calibrating(&self) -> bool {
         self.taken.is_some()
+    }
+
+    /// How long the room is still measured, s; `None` if it is not.
+    pub fn calibration_left_s(&self) -> Option<f64> {
+        self.taken.map(|taken| (LEVELS - taken) as f64 * STEP_S)
     }
 
     /// Whether the microphone has given anything but exact zeros.
