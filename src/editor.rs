@@ -199,75 +199,6 @@ impl Tab {
     }
 }
 
-/// The state of the window that is saved with a project. [`WindowState::mended`] limits values from a file to their ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct WindowState {
-    /// Width and height, points.
-    pub size: (f32, f32),
-    /// Zoom, 0.5..=3.
-    pub zoom: f32,
-    /// Dark theme.
-    pub is_dark: bool,
-    /// The view in front.
-    pub tab: Tab,
-    /// The views of a laboratory are offered too.
-    pub is_lab: bool,
-    /// Which pitch the names of notes say.
-    pub names: NoteNames,
-}
-
-impl Default for WindowState {
-    fn default() -> Self {
-        Self {
-            size: SIZE,
-            zoom: 1.0,
-            is_dark: true,
-            tab: Tab::Play,
-            is_lab: false,
-            names: NoteNames::Written,
-        }
-    }
-}
-
-impl WindowState {
-    /// The same, with every value inside its range.
-    pub fn mended(self) -> Self {
-        let d = Self::default();
-        let fix = |x: f32, (low, high): (f32, f32), default| {
-            if x.is_finite() { x.clamp(low, high) } else { default }
-        };
-        Self {
-            size: (
-                fix(self.size.0, (LEAST_SIZE.0, 8_000.0), d.size.0),
-                fix(self.size.1, (LEAST_SIZE.1, 8_000.0), d.size.1),
-            ),
-            zoom: fix(self.zoom, ZOOM, d.zoom),
-            // A project from before the choice may show the reed.
-            is_lab: self.is_lab || self.tab == Tab::Reed,
-            ..self
-        }
-    }
-
-    /// Whether a view is offered. `has_knob`: a knob is connected or chosen.
-    pub fn offers(&self, tab: Tab, has_knob: bool) -> bool {
-        match tab {
-            Tab::Reed => self.is_lab,
-            Tab::Knob => self.is_lab || has_knob || self.tab == Tab::Knob,
-            _ => true,
-        }
-    }
-
-    /// The window has this size now, points. A difference from rounding to whole pixels is no change, so a project that is
-    /// opened and not edited stays as it was saved.
-    pub fn resized(&mut self, width: f32, height: f32) {
-        let is_near = |a: f32, b: f32| (a - b).abs() <= 2.0;
-        if !(is_near(self.size.0, width) && is_near(self.size.1, height)) {
-            self.size = (width, height);
-        }
-    }
-}
-
 /// Everything the window remembers between frames.
 #[derive(Clone, Debug, Default)]
 pub struct EditorState {
@@ -393,7 +324,14 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     }
     breath.look(&snapshot.sources, ui.input(|input| input.time));
     trial.keep_to(snapshot, &mut actions);
-    let has_knob = snapshot.knob.is_live || !snapshot.knob.devices.is_empty() || hands.step("knob") > 0;
+    // A window that has grown past the screen hides the list of sizes.
+    if keyboard.has_letters()
+        && ui.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Num0))
+    {
+        kept.zoom = 1.0;
+    }
+    let is_listed = snapshot.knob.devices.iter().any(|device| device.is_knob);
+    let has_knob = snapshot.knob.is_live || is_listed || hands.step("knob") > 0;
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);

@@ -12,6 +12,9 @@ use crate::editor::theme::Colours;
 /// Height of the line above a picture, points.
 const NAME_HEIGHT: f32 = 14.0;
 
+/// Height of a line of a legend, points.
+pub const LEGEND_LINE: f32 = 15.0;
+
 /// What a picture shows.
 pub struct Chart<'a> {
     /// Unique among the pictures of a view.
@@ -184,11 +187,30 @@ pub fn legend(ui: &Ui, transform: &PlotTransform, height: f32, lines: &[(&str, C
     let ground = behind_words(ui);
     for (line, (text, colour)) in lines.iter().enumerate() {
         let galley = painter.layout_no_wrap((*text).to_owned(), theme::small(), *colour);
-        let top = frame.top() + height * frame.height() + 15.0 * line as f32;
+        let top = frame.top() + height * frame.height() + LEGEND_LINE * line as f32;
         let at = egui::pos2(frame.right() - 8.0 - galley.size().x, top);
         let behind = Rect::from_min_size(at, galley.size()).expand2(vec2(3.0, 1.0));
         painter.rect_filled(behind, egui::CornerRadius::same(2), ground);
         painter.galley(at, galley, *colour);
+    }
+}
+
+/// Names of curves in their colours, one beside the other from a place on, as many in a line as there is room for.
+pub fn legend_below(ui: &Ui, transform: &PlotTransform, from: egui::Pos2, lines: &[(&str, Color32)]) {
+    let frame = *transform.frame();
+    let painter = ui.painter_at(frame);
+    let ground = behind_words(ui);
+    let mut at = from;
+    for (text, colour) in lines {
+        let galley = painter.layout_no_wrap((*text).to_owned(), theme::small(), *colour);
+        let size = galley.size();
+        if at.x > from.x && at.x + size.x > frame.right() - 4.0 {
+            at = egui::pos2(from.x, at.y + LEGEND_LINE);
+        }
+        let behind = Rect::from_min_size(at, size).expand2(vec2(3.0, 0.0));
+        painter.rect_filled(behind, egui::CornerRadius::same(2), ground);
+        painter.galley(at, galley, *colour);
+        at.x += size.x + 14.0;
     }
 }
 

@@ -206,9 +206,9 @@ fn sides(
     let blind = ui.add_enabled(why_not.is_none(), egui::Button::new("Blind"));
     let blind = blind
         .on_hover_text("Compare without knowing which is which: A and B appear as X and Y in random order");
-        compare.switch(compare.behind(true), hands, &snapshot.preset, actions);
     if blind.on_disabled_hover_text(why_not.unwrap_or_default()).clicked() {
         compare.hide();
+        compare.switch(compare.behind(true), hands, &snapshot.preset, actions);
     }
     let (text, other) = match compare.side {
         ComparisonSide::A if is_wide => ("A to B", "B"),
@@ -331,6 +331,8 @@ fn status(ui: &mut Ui, snapshot: &Snapshot) {
     let Some(Status { level, text }) = snapshot.status.first().cloned() else { return };
     let width = ui.available_width() - 20.0;
     let label = egui::Label::new(egui::RichText::new(&text).font(theme::small()).color(c.quiet)).truncate();
+    // Its own tip below has all lines.
+    let label = label.show_tooltip_when_elided(false);
     let galley = ui.painter().layout_no_wrap(text.clone(), theme::small(), c.quiet);
     let response = ui.add_sized(vec2(width.min(galley.size().x + 4.0), 16.0), label);
     let (dot, _) = ui.allocate_exact_size(vec2(10.0, 10.0), Sense::hover());

@@ -177,6 +177,14 @@ impl Keyboard {
     }
 }
 
+/// Names and letters on white keys.
+const ON_IVORY: Color32 = Color32::from_gray(80);
+
+/// The colour of a key that makes no sound, for the colour of one that does.
+fn silent(plain: Color32) -> Color32 {
+    plain.lerp_to_gamma(Color32::from_gray(96), 0.6)
+}
+
 fn is_black(note: u8) -> bool {
     matches!(note % 12, 1 | 3 | 6 | 8 | 10)
 }
@@ -244,7 +252,7 @@ impl Keys {
                 } else if name.is_some() {
                     plain
                 } else {
-                    plain.lerp_to_gamma(c.ground, 0.5)
+                    silent(plain)
                 };
                 let round = CornerRadius { nw: 0, ne: 0, sw: 3, se: 3 };
                 painter.rect(
@@ -270,7 +278,7 @@ impl Keys {
             let ink = match (is_down, is_black(note)) {
                 (true, _) => c.on_accent,
                 (_, true) => c.ivory,
-                (_, false) => Color32::from_gray(90),
+                (_, false) => ON_IVORY,
             };
             let words = painter.layout_no_wrap(letter.to_owned(), theme::small(), ink);
             // Clear of the names below, and on a white key of the black ones above.
@@ -283,7 +291,7 @@ impl Keys {
             let (key, is_down) = (self.key(note), down.contains(&Some(note)));
             let has_name = note % 12 == 0 || !is_black(note) && key.width() >= NAME_WIDTH || is_down;
             let Some(name) = named(note).filter(|_| has_name) else { continue };
-            let ink = if is_down { c.on_accent } else { Color32::from_gray(110) };
+            let ink = if is_down { c.on_accent } else { ON_IVORY };
             let words = painter.layout_no_wrap(note_name(name), theme::small(), ink);
             let left = (key.center().x - 0.5 * words.size().x)
                 .clamp(self.rect.left(), self.rect.right() - words.size().x);
@@ -299,6 +307,19 @@ impl Keys {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_read_on_white_keys_and_silent_keys_look_silent() {
+        for theme in [egui::Theme::Light, egui::Theme::Dark] {
+            let c = Colours::of(theme);
+            assert!(theme::contrast(ON_IVORY, c.ivory) > 4.5, "{theme:?}");
+            for plain in [c.ivory, c.ebony] {
+                let contrast = theme::contrast(plain, silent(plain));
+                assert!(contrast > 1.5, "{theme:?} {plain:?} {contrast}");
+            }
+            assert!(theme::contrast(silent(c.ivory), silent(c.ebony)) > 1.5, "white from black, {theme:?}");
+        }
+    }
 
     #[test]
     fn every_key_is_where_it_is_drawn() {

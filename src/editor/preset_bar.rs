@@ -75,7 +75,7 @@ pub fn bar(
     let said = format!("Preset {shown}{}", if has_changed { ", changed" } else { "" });
     response.widget_info(|| WidgetInfo::selected(Role::Button, true, browser.is_open, &said));
     if response.clicked() {
-        browser.toggle(actions);
+        browser.toggle(name, actions);
     }
     response.on_hover_ui(|ui| {
         ui.set_max_width(300.0);

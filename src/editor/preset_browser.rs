@@ -32,6 +32,10 @@ pub struct PresetBrowser {
     favourites: bool,
     yours: bool,
     form: Option<Form>,
+    /// The preset of this name is to be scrolled to, once the list has it.
+    reveal: Option<String>,
+    /// Presets in the list of the frame before.
+    listed: usize,
 }
 
 /// What is being typed.
@@ -43,15 +47,22 @@ enum Form {
 }
 
 impl PresetBrowser {
-    /// Opens or closes it.
-    pub fn toggle(&mut self, actions: &mut Vec<Action>) {
+    /// Opens or closes it. `chosen`: name of the preset that is chosen, which it shows.
+    pub fn toggle(&mut self, chosen: &str, actions: &mut Vec<Action>) {
         self.is_open = !self.is_open;
         self.form = None;
         if self.is_open {
-            // What was looked for the last time hides the rest.
-            self.search.clear();
+            self.show(chosen.to_owned());
             actions.push(Action::ReadPresets);
         }
+    }
+
+    /// Shows a preset in the list. What was looked for the last time would hide it, and the rest.
+    fn show(&mut self, name: String) {
+        self.search.clear();
+        self.tags.clear();
+        (self.favourites, self.yours) = (false, false);
+        (self.reveal, self.listed) = (Some(name), 0);
     }
 
     /// Draws it.
@@ -108,7 +119,7 @@ impl PresetBrowser {
             && preset.is_found_by(&self.search)
     }
 
-    fn list(&self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    fn list(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let shelf = &snapshot.presets;
         let shown: Vec<&Preset> = shelf.all().filter(|preset| self.is_shown(preset, shelf)).collect();
         if shown.is_empty() {
@@ -119,7 +130,21 @@ impl PresetBrowser {
             return;
         }
         ui.spacing_mut().item_spacing.y = 0.0;
-        let area = egui::ScrollArea::vertical().id_salt("presets").auto_shrink([false, false]);
+        let mut area = egui::ScrollArea::vertical().id_salt("presets").auto_shrink([false, false]);
+        let found = |name: &String| shown.iter().position(|preset| preset.name == *name);
+        let before = std::mem::replace(&mut self.listed, shown.len());
+        let wanted = self.reveal.as_ref().and_then(found);
+        // A list that has grown knows its length a frame later: it would spring back from beyond the end of before.
+        if wanted.is_some() && before != shown.len() {
+            ui.ctx().request_repaint();
+        } else if let Some(at) = wanted {
+            // In the middle, so that its neighbours are seen too.
+            let height = ui.available_height();
+            let most = (shown.len() as f32 * ROW - height).max(0.0);
+            let middle = at as f32 * ROW - 0.5 * (height - ROW);
+            area = area.vertical_scroll_offset(middle.clamp(0.0, most));
+            self.reveal = None;
+        }
         area.show_rows(ui, ROW, shown.len(), |ui, rows| {
             for preset in &shown[rows] {
                 let is_here = snapshot.preset == preset.name;
@@ -144,7 +169,17 @@ impl PresetBrowser {
         heading(ui, if snapshot.preset.is_empty() { "No preset chosen" } else { &snapshot.preset });
         // Above what the preset sets, which may be long.
         match self.form.take() {
-            Some(form) => self.form = draw_form(ui, form, hands, shelf, actions),
+            Some(form) => {
+                let before = actions.len();
+                self.form = draw_form(ui, form, hands, shelf, actions);
+                let saved = actions[before..].iter().find_map(|action| match action {
+                    Action::SavePreset(preset) => Some(preset.name.clone()),
+                    _ => None,
+                });
+                if let Some(name) = saved {
+                    self.show(name);
+                }
+            }
             None => {
                 self.form = offer_forms(ui, snapshot);
                 if self.form.is_some() {

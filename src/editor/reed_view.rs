@@ -25,6 +25,14 @@ use chalumeau_core::units::Air;
 /// Points of a curve.
 const POINTS: usize = 160;
 
+/// Height of the legend below the axis of the flow, points: two lines, and what the handle on the axis takes.
+const LEGEND: f32 = HANDLE + 2.0 * chart::LEGEND_LINE;
+const HANDLE: f32 = 13.0;
+/// What the names and numbers around a chart take of its height, points, about.
+const AROUND: f32 = 60.0;
+/// Least room below the axis, over that above it.
+const LEAST_BELOW: f32 = 0.12;
+
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct ReedView {
@@ -144,13 +152,19 @@ impl ReedView {
             .collect();
         let period = snapshot.scope.last_period(snapshot.heard.f0_hz.unwrap_or(0.0));
         let is_sounding = snapshot.heard.f0_hz.is_some();
+        let height = ui.available_height();
+        let has_legend = ui.available_width() > 300.0 && height > 250.0;
+        // The legend lies below the axis, where no curve is.
+        let below =
+            if has_legend { (LEGEND / (height - AROUND - LEGEND)).max(LEAST_BELOW) } else { LEAST_BELOW };
+        let below = f64::from(below);
         let transform = Chart {
             id: "flow",
             x: (-0.1 * right, right),
-            y: (-0.12 * top, top),
+            y: (-below * top, top),
             x_name: "mouth minus mouthpiece pressure, kPa",
             y_name: "flow through the reed, cm\u{b3}/s",
-            height: ui.available_height(),
+            height,
             label: "Flow through the reed over pressure difference",
         }
         .show(ui, |plot| {
@@ -168,17 +182,18 @@ impl ReedView {
             }
         });
         chart::names(ui, &transform, &marks);
-        if ui.available_width() > 300.0 && transform.frame().height() > 200.0 {
+        if has_legend {
             let sounding = if is_sounding { "one period of the sound" } else { "the reed does not swing" };
-            let mut lines = vec![("flow law of the reed", c.ink), (sounding, c.breath)];
+            let mut lines = vec![("law of the reed", c.ink), (sounding, c.breath)];
             if snapshot.lip.is_some() {
-                lines.push(("thin: the law under the player's lip", c.breath));
+                lines.push(("thin: under the player's lip", c.breath));
             }
             if kpa > f64::from(NO_BREATH_KPA) {
-                lines.push(("circle: the reed at rest", c.breath));
+                lines.push(("circle: at rest", c.breath));
             }
-            // Below, where the closed reed lets nothing through.
-            chart::legend(ui, &transform, 0.70, &lines);
+            // Clear of the handle on the axis.
+            let from = transform.position_from_point(&PlotPoint::new(0.0, 0.0)) + vec2(8.0, HANDLE);
+            chart::legend_below(ui, &transform, from, &lines);
         }
         self.handles(ui, hands, snapshot, &picture, &transform, (right, top));
     }

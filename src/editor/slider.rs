@@ -10,6 +10,7 @@ use crate::editor::controls::{Entry, Hands, Look, Mark, teach};
 use crate::editor::host_marks;
 use crate::editor::key_steps::KeySteps;
 use crate::editor::linked_controllers;
+use crate::editor::terms;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -184,6 +185,9 @@ fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
     let response = ui.new_child(egui::UiBuilder::new().max_rect(rect)).put(rect, field);
     let name = hands.name(id);
     response.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, format!("{name}, value")));
+    if entry.is_wrong {
+        say_range(ui, id, rect);
+    }
     if !entry.is_shown {
         entry.is_shown = true;
         response.request_focus();
@@ -192,7 +196,7 @@ fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
     let is_left = response.lost_focus();
     let is_taken = is_left && ui.input(pressed_enter);
     if is_taken {
-        match hands.controls.parse(id, &entry.text) {
+        match typed(hands, id, &entry.text) {
             Some(value) => hands.put(id, value),
             None => {
                 entry.is_wrong = true;
@@ -203,6 +207,27 @@ fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
     } else if !is_left {
         *hands.entry = Some(entry);
     }
+}
+
+/// What was typed as a normalised value; `None` where it is none, or lies outside the range. Hosts take the end of the range for
+/// what lies outside, which would be a surprise here.
+fn typed(hands: &Hands, id: &str, text: &str) -> Option<f32> {
+    let is_right = terms::of(id).is_none_or(|parameter| parameter.read(text).is_ok());
+    hands.controls.parse(id, text).filter(|_| is_right)
+}
+
+/// Says below a field what it takes.
+fn say_range(ui: &mut Ui, id: &str, field: Rect) {
+    let Some(parameter) = terms::of(id) else { return };
+    let c = Colours::here(ui);
+    let said = egui::RichText::new(parameter.range()).font(theme::small()).color(c.danger);
+    let galley = ui.painter().layout_no_wrap(parameter.range(), theme::small(), c.danger);
+    let size = galley.size() + vec2(6.0, 0.0);
+    let place = Rect::from_min_size(pos2(field.right() - size.x, field.bottom() + 1.0), size);
+    // Over the slider's track, which is at rest meanwhile.
+    ui.painter().rect_filled(place, CornerRadius::same(2), c.panel);
+    let inside = egui::UiBuilder::new().max_rect(place);
+    ui.new_child(inside).put(place, egui::Label::new(said).extend());
 }
 
 fn select_all(ui: &Ui, id: egui::Id, chars: usize) {

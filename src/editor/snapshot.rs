@@ -153,10 +153,10 @@ impl Default for Snapshot {
             feel: Err("no knob feel yet".into()),
             knob: KnobState::default(),
             latency_ms: 0.0,
+            room: None,
         }
     }
 }
-            room: None,
 
 impl Snapshot {
     /// The settings with the reed as the lip has it now.
@@ -394,6 +394,8 @@ pub struct KnobDevice {
     pub is_chosen: bool,
     /// Nothing stands in the way.
     pub is_free: bool,
+    /// It is surely a knob. A MIDI port, a board with a common chip and the entry for OSC may be one or not.
+    pub is_knob: bool,
 }
 
 #[cfg(test)]

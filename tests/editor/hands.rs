@@ -464,10 +464,18 @@ fn wrong_text_is_kept_until_it_is_right_and_leaving_it_changes_nothing() {
         window.harness.run();
     };
     open(&mut window);
-    window.harness.get_by_label("Lip opening, value").type_text("much");
-    window.harness.key_press(Key::Enter);
-    window.harness.run();
-    assert!(window.harness.query_by_label("Lip opening, value").is_some());
+    let range = terms::of("lip").unwrap().range();
+    assert!(window.harness.query_by_label(&range).is_none());
+    // No number, and one that hosts would take for the end of the range.
+    for text in ["much", "5555"] {
+        window.harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+        window.harness.get_by_label("Lip opening, value").type_text(text);
+        window.harness.key_press(Key::Enter);
+        window.harness.run();
+        assert!(window.harness.query_by_label("Lip opening, value").is_some(), "{text}");
+        window.harness.get_by_label(&range);
+        assert_eq!(window.host.plain("lip"), 1.0, "{text}");
+    }
     window.harness.key_press(Key::Escape);
     window.harness.run();
     assert!(window.harness.query_by_label("Lip opening, value").is_none());

@@ -178,6 +178,50 @@ fn ones_own_are_saved_renamed_and_deleted_as_actions() {
 }
 
 #[test]
+fn the_browser_opens_at_the_chosen_preset_and_shows_what_was_saved() {
+    let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
+    window.snapshot.borrow_mut().presets = shelf();
+    let last = factory::all().last().unwrap().name.clone();
+    let first = factory::all()[0].name.clone();
+    let is_listed = |window: &Window, name: &str| window.harness.query_by_label(name).is_some();
+    window.snapshot.borrow_mut().preset = last.clone();
+    window.harness.run();
+    click(&mut window, &format!("Preset {last}, changed"));
+    assert!(
+        is_listed(&window, &format!("Favourite {last}"))
+            && !is_listed(&window, &format!("Favourite {first}"))
+    );
+    // What was looked for the last time hides nothing.
+    for chip in ["klezmer", "Favourites", "Yours"] {
+        click(&mut window, chip);
+    }
+    assert!(!is_listed(&window, &format!("Favourite {last}")));
+    for _ in 0..2 {
+        click(&mut window, &format!("Preset {last}, changed"));
+    }
+    assert!(is_listed(&window, &format!("Favourite {last}")));
+
+    // A preset that is saved comes to the list later, far from where the list is.
+    let mut user = shelf().user.clone();
+    click(&mut window, "Save as");
+    fill(&mut window, "Name of the preset", "Aaa");
+    click(&mut window, "Yours");
+    click(&mut window, "Save");
+    let saved = window.actions().into_iter().find_map(|action| match action {
+        Action::SavePreset(preset) => Some(preset),
+        _ => None,
+    });
+    user.presets.push(saved.expect("saved"));
+    user.presets.extend((0..40).map(|n| {
+        Preset::parse(&format!("format = 1\nname = \"Z {n}\"\n[parameters]\nlip = 0.9\n")).unwrap()
+    }));
+    window.snapshot.borrow_mut().presets = Arc::new(PresetShelf { user, notice: None });
+    window.snapshot.borrow_mut().preset = "Aaa".to_owned();
+    window.harness.run();
+    assert!(is_listed(&window, "Favourite Aaa"));
+}
+
+#[test]
 fn a_blind_comparison_hides_the_preset() {
     let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
     click(&mut window, "Setting B");

@@ -338,6 +338,7 @@ fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
                 state: "in use here, /dev/ttyACM0".into(),
                 is_chosen: true,
                 is_free: true,
+                is_knob: true,
             },
             KnobDevice {
                 key: "sim".into(),
@@ -345,6 +346,7 @@ fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
                 state: "ready".into(),
                 is_chosen: false,
                 is_free: true,
+                is_knob: true,
             },
             KnobDevice {
                 key: "ttyUSB0".into(),
@@ -352,6 +354,7 @@ fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
                 state: "no permission: add yourself to the group dialout".into(),
                 is_chosen: false,
                 is_free: false,
+                is_knob: false,
             },
         ],
         text: "Chalumeau sim 5eed0001 (firmware 0.3.0) at /dev/pts/3".into(),

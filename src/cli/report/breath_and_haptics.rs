@@ -2,6 +2,7 @@
 
 use crate::cli::render_job::RenderJob;
 use crate::cli::report::{number, word};
+use crate::parameters::{self, Kind};
 use chalumeau_core::haptics::torque_law::torque_mnm;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
 use chalumeau_core::instrument::{KeyPitches, Model, Reach, Settings};
@@ -21,8 +22,6 @@ use std::sync::Arc;
 const EXPONENTS: [f64; 3] = [1.0, 3.0, 5.0];
 /// Both laws that push.
 const LAWS: [TorqueLaw; 2] = [TorqueLaw::Flow, TorqueLaw::Pressure];
-/// Greatest mouth pressure of the instrument, kPa.
-const MOST_KPA: f64 = 20.0;
 /// The crescendo goes to this many times the pressure at which the note chokes.
 const BEYOND: f64 = 1.06;
 /// Time of the crescendo, and again of the diminuendo, s: a long breath.
@@ -31,6 +30,14 @@ const SWELL_S: f64 = 6.0;
 const POINTS: usize = 400;
 /// A mode that starts at this many times the pressure of the first belongs to another register.
 const LATER: f64 = 1.01;
+
+/// Greatest mouth pressure of the instrument, kPa: the upper end of *Full breath*.
+fn most_kpa() -> f64 {
+    match parameters::find("full").map(|parameter| parameter.kind) {
+        Some(Kind::Number(number)) => f64::from(number.max),
+        _ => f64::INFINITY,
+    }
+}
 
 fn law_name(law: TorqueLaw) -> &'static str {
     match law {
@@ -138,7 +145,7 @@ impl<'a> BreathAndHaptics<'a> {
         let closing_kpa = self.closing_kpa();
         let file = &self.prepared.model.file;
         let sounding = written.sounding(file.transposition)?;
-        let most = f64::from(GAMMA_MAX).min(MOST_KPA / closing_kpa);
+        let most = f64::from(GAMMA_MAX).min(most_kpa() / closing_kpa);
         let gamma = (BEYOND * asked?.gamma_off).min(most);
         let settings = Settings {
             breath_full_kpa: (gamma * closing_kpa).max(1.0) as f32,

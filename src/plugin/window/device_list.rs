@@ -51,7 +51,14 @@ pub fn list(
         let is_chosen = kind == KnobKind::Midi && in_use.is_some_and(|status| status.port == name);
         let state = if is_chosen { "in use" } else { "MIDI port" };
         let key = format!("{MIDI}{name}");
-        devices.push(KnobDevice { key, name, state: state.into(), is_chosen, is_free: true });
+        devices.push(KnobDevice {
+            key,
+            name,
+            state: state.into(),
+            is_chosen,
+            is_free: true,
+            is_knob: is_chosen,
+        });
     }
     devices.push(KnobDevice {
         key: OSC.into(),
@@ -59,6 +66,7 @@ pub fn list(
         state: "read only: angle to breath, no feel".into(),
         is_chosen: kind == KnobKind::Osc,
         is_free: true,
+        is_knob: kind == KnobKind::Osc,
     });
     devices
 }
@@ -76,6 +84,7 @@ fn linked_device(status: &LinkStatus, serial: u64) -> KnobDevice {
         state: if is_live { format!("in use, {}", status.port) } else { status.text.clone() },
         is_chosen: true,
         is_free: is_live,
+        is_knob: true,
     }
 }
 
@@ -93,6 +102,7 @@ fn found_device(places: &RuntimeDir, candidate: &Candidate) -> KnobDevice {
                     .map_or_else(|| format!("simulated, {port}"), |who| format!("held by {who}")),
                 is_chosen: false,
                 is_free: holder.is_none(),
+                is_knob: true,
             }
         }
         (PortKind::Usb { chip, .. }, hint) => KnobDevice {
@@ -101,6 +111,7 @@ fn found_device(places: &RuntimeDir, candidate: &Candidate) -> KnobDevice {
             state: format!("{port}: asked when chosen"),
             is_chosen: false,
             is_free: true,
+            is_knob: false,
         },
     }
 }
@@ -140,7 +151,10 @@ mod tests {
         let _advert = Announcement::publish(&places, 0x51, "KnobController knob", &port).unwrap();
         let listed = || list(&places, KnobKind::Off, None, &mut false);
         let knob = listed().into_iter().find(|device| device.key == "serial:0000000000000051").unwrap();
-        assert!(knob.name.starts_with("KnobController knob") && knob.is_free && !knob.is_chosen, "{knob:?}");
+        assert!(
+            knob.name.starts_with("KnobController knob") && knob.is_free && !knob.is_chosen && knob.is_knob,
+            "{knob:?}"
+        );
         let _mine = Ownership::take(&places, 0x51, "Track 1", "").unwrap();
         let knob = listed().into_iter().find(|device| device.key == "serial:0000000000000051").unwrap();
         assert!(!knob.is_free && knob.state.contains("held by Track 1"), "{knob:?}");
@@ -153,7 +167,7 @@ mod tests {
         for (kind, is_chosen) in [(KnobKind::Off, false), (KnobKind::Osc, true)] {
             let devices = list(&places, kind, None, &mut false);
             let osc = devices.iter().find(|device| device.key == OSC).unwrap();
-            assert_eq!(osc.is_chosen, is_chosen);
+            assert_eq!((osc.is_chosen, osc.is_knob), (is_chosen, is_chosen));
         }
     }
 }
