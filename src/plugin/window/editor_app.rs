@@ -191,12 +191,8 @@ impl EditorApp {
     pub(super) fn open(shared: Arc<SharedWindow>, memory: Arc<Mutex<WindowMemory>>, gui: GuiContext) -> Self {
         shared.is_open.store(true, Ordering::Relaxed);
         // A host that sleeps would show an old picture, and hear no key of the window.
-        let zoom = {
-            let memory = memory.lock().unwrap_or_else(PoisonError::into_inner);
-            memory.handles.params.host.wake();
-            kept(&memory.handles.params).zoom
-        };
-        Self { shared, memory, gui, has_drawn: false, size: SizeWatch::new(zoom, Instant::now()) }
+        memory.lock().unwrap_or_else(PoisonError::into_inner).handles.params.host.wake();
+        Self { shared, memory, gui, has_drawn: false, size: SizeWatch::default() }
     }
 }
 

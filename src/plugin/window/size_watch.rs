@@ -22,33 +22,34 @@ pub enum Seen {
 }
 
 /// Watches zoom and size.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SizeWatch {
     zoom: f32,
     size: (f32, f32),
-    since: Instant,
+    /// When a size was asked for; `None` before the first frame, which may come long after the window was asked for.
+    since: Option<Instant>,
 }
 
 impl SizeWatch {
-    /// Of a window that opens with a zoom.
-    pub fn new(zoom: f32, now: Instant) -> Self {
-        Self { zoom, size: (0.0, 0.0), since: now }
-    }
-
     /// A size has been asked for.
     pub fn settle(&mut self, now: Instant) {
-        self.since = now;
+        self.since = Some(now);
     }
 
     /// Sees the zoom and the size in points of a frame.
     pub fn look(&mut self, zoom: f32, size: (f32, f32), now: Instant) -> Seen {
         let before = std::mem::replace(&mut self.size, size);
-        if std::mem::replace(&mut self.zoom, zoom) != zoom {
+        let zoom_before = std::mem::replace(&mut self.zoom, zoom);
+        let Some(since) = self.since else {
+            self.settle(now);
+            return Seen::Settling;
+        };
+        if zoom_before != zoom {
             self.settle(now);
             return Seen::Zoomed;
         }
         let is_same = (before.0 - size.0).abs() <= SAME && (before.1 - size.1).abs() <= SAME;
-        if now.duration_since(self.since) < SETTLES_WITHIN {
+        if now.duration_since(since) < SETTLES_WITHIN {
             Seen::Settling
         } else if is_same {
             // Slow drags add up.
@@ -71,7 +72,9 @@ mod tests {
     fn a_zoom_brings_sizes_that_are_not_the_users() {
         let began = Instant::now();
         let at = |ms: u64| began + Duration::from_millis(ms);
-        let mut watch = SizeWatch::new(1.0, began);
+        let mut watch = SizeWatch::default();
+        // The library draws its first frame without knowing the size.
+        assert_eq!(watch.look(1.0, (10_000.0, 10_000.0), at(0)), Seen::Settling);
         assert_eq!(watch.look(1.0, SIZE, at(10)), Seen::Settling, "as it has opened");
         assert_eq!(watch.look(1.0, SIZE, at(2_000)), Seen::Still);
         assert_eq!(watch.look(0.5, (2_200.0, 1_440.0), at(2_010)), Seen::Zoomed);
@@ -85,7 +88,7 @@ mod tests {
     #[test]
     fn what_the_user_drags_is_the_users_however_slowly() {
         let began = Instant::now();
-        let mut watch = SizeWatch::new(1.0, began);
+        let mut watch = SizeWatch::default();
         watch.look(1.0, SIZE, began);
         let later = began + 2 * SETTLES_WITHIN;
         let drag = |watch: &mut SizeWatch, by: f32| watch.look(1.0, (SIZE.0 + by, SIZE.1), later);
