@@ -51,6 +51,11 @@ const PLAIN_PERIOD_US: u32 = 10_000;
 const PLAIN_AFTER_US: i64 = 600_000;
 /// Two angles further apart than this say nothing of speed, us.
 const PLAIN_GAP_US: i64 = 200_000;
+/// As far from a zero that nobody has set, degrees, people are told before the knob is armed. By judgement: what a hand turns
+/// without noticing.
+pub const STRAY_DEG: f64 = 5.0;
+/// What a restart means, after what has happened.
+pub const ZERO_IS_LOST: &str = "its zero is where it stood then: set it again (Rest here; --zero on the command line; This is zero on the web page)";
 
 /// One measurement of the knob, for recording and study.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -153,6 +158,12 @@ pub struct HostSession {
     next_alive_us: i64,
     next_slot_us: i64,
     zeroing: Zeroing,
+    /// ZEROs that the knob has shown to have heard.
+    zeros: u32,
+    /// It is known where the knob's zero is: it has been set, or the knob was armed there, since this connection or a restart.
+    is_zero_known: bool,
+    /// A STATE has come since the first INFO: HELLO, which changes the knob's epoch, lies before it.
+    is_dated: bool,
     rate_due: bool,
     clock: DeviceClock,
     state: Option<(DeviceState, i64)>,
@@ -191,6 +202,9 @@ impl HostSession {
             has_plain_angle: false,
             next_slot_us: now_us,
             zeroing: Zeroing::default(),
+            zeros: 0,
+            is_zero_known: false,
+            is_dated: false,
             rate_due: false,
             clock: DeviceClock::default(),
             state: None,
@@ -226,6 +240,23 @@ impl HostSession {
     /// True while the knob says that it is armed and shall be.
     pub fn is_armed(&self) -> bool {
         self.arming.is_armed()
+    }
+
+    /// True from the user's act until the knob says that it is armed, or the act is over.
+    pub fn is_arming(&self) -> bool {
+        self.arming.is_arming()
+    }
+
+    /// How often the knob has shown that it has heard ZERO.
+    pub fn zeros(&self) -> u32 {
+        self.zeros
+    }
+
+    /// How far the knob stands from a zero that nobody has set or armed at since it was connected or has restarted, degrees;
+    /// `None` if that is no more than [`STRAY_DEG`]. Armed there, it may turn back by itself.
+    pub fn stray_deg(&self) -> Option<f64> {
+        let angle_deg = self.state()?.angle_deg();
+        (!self.is_zero_known && angle_deg.abs() > STRAY_DEG).then_some(angle_deg)
     }
 
     /// What ARM and ALIVE carry, mNm.
@@ -339,7 +370,13 @@ impl HostSession {
         if self.arming.is_wanted() {
             self.notice = Some(Notice::Told(format!("disarmed: {why}")));
         }
+        self.take_away(now_us);
+    }
+
+    /// Torque off. A zero that waits for that would come at whatever angle the knob has then.
+    fn take_away(&mut self, now_us: i64) {
         self.arming.disarm(now_us);
+        self.zeroing.forget();
     }
 
     /// Who should obey the user and does not.
@@ -354,7 +391,7 @@ impl HostSession {
     /// The knob cannot be believed: torque off, and people are told why.
     fn distrust(&mut self, doubt: Doubt, now_us: i64) {
         if self.trust.doubts(doubt) {
-            self.arming.disarm(now_us);
+            self.take_away(now_us);
         }
     }
 
@@ -366,12 +403,12 @@ impl HostSession {
     /// Torque off.
     pub fn disarm(&mut self, now_us: i64) {
         self.notice = None;
-        self.arming.disarm(now_us);
+        self.take_away(now_us);
     }
 
-    /// The present position becomes zero; not while the knob is armed.
+    /// The present position becomes zero; not while the knob is armed, or told to arm: it turns when its signs are probed.
     pub fn zero(&mut self) {
-        if self.arming.is_armed() {
+        if self.arming.is_wanted() {
             self.refusal = Some(wire::RefusedCode::ZeroWhileArmed.text().into());
         } else {
             self.zeroing.want();
@@ -413,6 +450,7 @@ impl HostSession {
                 self.let_go("the knob sends nothing any more", now_us);
             }
             self.arming.forget();
+            self.zeroing.forget();
         }
         // Most urgent first: over MIDI only one frame goes out at a time.
         while self.has_slot(now_us) {
@@ -467,13 +505,13 @@ impl HostSession {
     }
 
     fn take_zero(&mut self, now_us: i64) -> Option<Message> {
-        let due = self.info.is_some() && self.is_free() && self.zeroing.poll(now_us);
+        let due = self.zeroing.poll(self.info.is_some() && self.is_free(), now_us);
         if self.zeroing.take_ignored() {
             let is_wanted = self.arming.is_wanted();
             let so = if is_wanted { "not armed: " } else { "" };
             self.refusal = Some(format!("{so}the knob has not taken its new zero; try again"));
             if is_wanted {
-                self.arming.disarm(now_us);
+                self.take_away(now_us);
             }
         }
         due.then(|| {
@@ -499,8 +537,9 @@ impl HostSession {
         // Without a STATE there is nothing that a permission could answer.
         let stamp = self.state().map(|state| Stamp { epoch: state.epoch.unwrap_or(0), heard_us: state.t_us });
         let arm = Arm { session: self.number, ceiling_mnm: self.arming.ceiling_mnm(), stamp };
-        let waits = self.arming.is_wanted() && self.zeroing.is_pending();
-        match if waits { None } else { self.arming.poll(now_us) } {
+        let waits = self.arming.is_wanted() && (self.zeroing.is_pending() || !self.is_dated);
+        let epoch = self.state().and_then(|state| state.epoch);
+        match if waits { None } else { self.arming.poll(now_us, epoch) } {
             Some(arming::ArmingMessage::Free) => return Some(Message::Free),
             Some(arming::ArmingMessage::Arm) => return Some(Message::Arm(arm)),
             None => {}

@@ -1,8 +1,9 @@
 //! When torque is allowed, and how it is taken away.
 //!
 //! ARM follows an act of the user and nothing else. It is said again while it shows no effect, for 200 ms: that is still
-//! the same act. Once the knob has been armed and no longer is, for whatever reason, a new act is needed. A knob that is
-//! armed while nobody wants it so is told FREE until it is not.
+//! the same act. All tries answer the epoch of the first: a knob that counts a disarming in between, or reports one, has been
+//! told to let go after the user's act, so the act is over. Once the knob has been armed and no longer is, for whatever reason,
+//! a new act is needed. A knob that is armed while nobody wants it so is told FREE until it is not.
 
 use crate::wire::Info;
 pub use crate::wire::limits::HARD_CEILING_MNM;
@@ -29,12 +30,23 @@ pub enum ArmingMessage {
     Free,
 }
 
+/// How an act of the user has ended by the knob's doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ArmingEnd {
+    /// The knob was armed and has disarmed by itself.
+    Disarmed,
+    /// The knob has counted a disarming after the first ARM, before it was seen armed.
+    Overtaken,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Goal {
     Free,
     /// Told to arm; not seen armed yet.
     Arming {
         tries: u32,
+        /// The knob's epoch at the first try; `None` before it, and from a knob that counts none.
+        epoch: Option<u16>,
     },
     Armed,
 }
@@ -95,7 +107,7 @@ impl Arming {
         if self.is_armed() {
             self.ceiling_tries = CEILING_TRIES;
         } else {
-            self.want = Goal::Arming { tries: 0 };
+            self.want = Goal::Arming { tries: 0, epoch: None };
         }
         self.next_us = now_us;
         self.say_free = false;
@@ -119,28 +131,52 @@ impl Arming {
         self.is_armed = false;
     }
 
-    /// Takes in whether the knob says that it is armed, or that it probes its signs before; true when it has disarmed by
-    /// itself.
-    pub fn hear(&mut self, is_armed: bool, is_probing: bool, now_us: i64) -> bool {
+    /// True while the user's act has not been seen to arm the knob.
+    pub fn is_arming(&self) -> bool {
+        matches!(self.want, Goal::Arming { .. })
+    }
+
+    /// The knob reports that it has let go, or cannot be armed: the act of the user is over. True if there was one.
+    pub fn give_up(&mut self) -> bool {
+        let is_arming = self.is_arming();
+        if is_arming {
+            (self.want, self.ceiling_tries) = (Goal::Free, 0);
+        }
+        is_arming
+    }
+
+    /// Takes in what a STATE says: whether the knob is armed, whether it probes its signs before, and its epoch, if it counts
+    /// one.
+    pub fn hear(
+        &mut self,
+        is_armed: bool,
+        is_probing: bool,
+        epoch: Option<u16>,
+        now_us: i64,
+    ) -> Option<ArmingEnd> {
         let was_armed = std::mem::replace(&mut self.is_armed, is_armed);
         match self.want {
+            Goal::Arming { epoch: first @ Some(_), .. } if epoch != first => {
+                self.give_up();
+                return Some(ArmingEnd::Overtaken);
+            }
             Goal::Arming { .. } if is_armed => self.want = Goal::Armed,
             // ARM has arrived: it need not be said again. The knob says itself how the probe ends.
-            Goal::Arming { .. } if is_probing => {
-                self.want = Goal::Arming { tries: TRIES };
+            Goal::Arming { epoch, .. } if is_probing => {
+                self.want = Goal::Arming { tries: TRIES, epoch };
                 self.next_us = now_us + INSIST_US;
             }
             Goal::Armed if was_armed && !is_armed => {
                 (self.want, self.ceiling_tries) = (Goal::Free, 0);
-                return true;
+                return Some(ArmingEnd::Disarmed);
             }
             _ => {}
         }
-        false
+        None
     }
 
-    /// What is due now.
-    pub fn poll(&mut self, now_us: i64) -> Option<ArmingMessage> {
+    /// What is due now, at the knob's epoch of the last STATE.
+    pub fn poll(&mut self, now_us: i64, epoch: Option<u16>) -> Option<ArmingMessage> {
         if now_us < self.next_us {
             return None;
         }
@@ -150,8 +186,9 @@ impl Arming {
                 self.next_us = now_us + INSIST_US;
                 Some(ArmingMessage::Free)
             }
-            Goal::Arming { tries } if tries < TRIES => {
-                self.want = Goal::Arming { tries: tries + 1 };
+            Goal::Arming { tries, epoch: first } if tries < TRIES => {
+                let epoch = if tries == 0 { epoch } else { first };
+                self.want = Goal::Arming { tries: tries + 1, epoch };
                 self.next_us = now_us + INSIST_US;
                 Some(ArmingMessage::Arm)
             }
@@ -197,7 +234,7 @@ pub(super) mod tests {
     }
 
     fn said(arming: &mut Arming, from_ms: i64, to_ms: i64) -> Vec<ArmingMessage> {
-        (from_ms..to_ms).filter_map(|ms| arming.poll(ms * 1000)).collect()
+        (from_ms..to_ms).filter_map(|ms| arming.poll(ms * 1000, Some(5))).collect()
     }
 
     #[test]
@@ -224,10 +261,14 @@ pub(super) mod tests {
         assert_eq!(said(&mut arming, 0, 100), []);
         arming.arm(100, false, &info(450), 100_000);
         assert_eq!(said(&mut arming, 100, 120), [ArmingMessage::Arm]);
-        assert!(!arming.hear(true, false, 0));
+        assert_eq!(arming.hear(true, false, Some(5), 0), None);
         assert!(arming.is_armed());
         assert_eq!(said(&mut arming, 120, 1000), []);
-        assert!(arming.hear(false, false, 0), "the knob disarmed by itself");
+        assert_eq!(
+            arming.hear(false, false, Some(6), 0),
+            Some(ArmingEnd::Disarmed),
+            "the knob disarmed by itself"
+        );
         assert_eq!(said(&mut arming, 1000, 3000), [], "and stays so");
     }
 
@@ -236,13 +277,13 @@ pub(super) mod tests {
         let mut arming = Arming::default();
         arming.arm(100, false, &info(450), 0);
         assert_eq!(said(&mut arming, 0, 10), [ArmingMessage::Arm]);
-        arming.hear(true, false, 10_000);
+        arming.hear(true, false, Some(5), 10_000);
         arming.arm(200, false, &info(450), 100_000);
         assert!(arming.is_armed());
         assert_eq!(said(&mut arming, 100, 1000), [ArmingMessage::Arm; 2]);
         arming.arm(150, false, &info(450), 1_000_000);
         assert_eq!(said(&mut arming, 1000, 1020), [ArmingMessage::Arm]);
-        assert!(arming.hear(false, false, 1_020_000));
+        assert_eq!(arming.hear(false, false, Some(6), 1_020_000), Some(ArmingEnd::Disarmed));
         assert_eq!(said(&mut arming, 1020, 2000), [], "it has let go by itself");
     }
 
@@ -251,7 +292,7 @@ pub(super) mod tests {
         let mut arming = Arming::default();
         arming.arm(100, false, &info(450), 0);
         assert_eq!(said(&mut arming, 0, 3000), [ArmingMessage::Arm; 4]);
-        arming.hear(true, false, 0);
+        arming.hear(true, false, Some(5), 0);
         assert_eq!(
             said(&mut arming, 3000, 3001),
             [ArmingMessage::Free],
@@ -262,11 +303,41 @@ pub(super) mod tests {
     #[test]
     fn an_armed_knob_nobody_wants_is_freed_until_it_is() {
         let mut arming = Arming::default();
-        arming.hear(true, false, 0);
+        arming.hear(true, false, Some(5), 0);
         assert_eq!(said(&mut arming, 0, 200), [ArmingMessage::Free; 4]);
-        arming.hear(false, false, 0);
+        arming.hear(false, false, Some(5), 0);
         assert_eq!(said(&mut arming, 200, 400), []);
         arming.disarm(400_000);
         assert_eq!(said(&mut arming, 400, 600), [ArmingMessage::Free], "said even if the knob seems free");
+    }
+
+    #[test]
+    fn a_disarming_between_two_tries_ends_the_act() {
+        let mut arming = Arming::default();
+        arming.arm(100, false, &info(450), 0);
+        assert_eq!(said(&mut arming, 0, 40), [ArmingMessage::Arm]);
+        assert_eq!(arming.hear(false, false, Some(5), 40_000), None);
+        // The first ARM had arrived, and the user has pressed the knob's own button since; the STATE between them is lost.
+        assert_eq!(arming.hear(false, false, Some(6), 45_000), Some(ArmingEnd::Overtaken));
+        assert_eq!(said(&mut arming, 45, 3000), []);
+        assert!(!arming.is_wanted() && !arming.take_ignored(), "the knob has answered");
+    }
+
+    #[test]
+    fn a_probe_that_ends_in_a_disarming_raises_no_doubt() {
+        for tells_epoch in [true, false] {
+            let mut arming = Arming::default();
+            arming.arm(100, false, &info(450), 0);
+            assert_eq!(said(&mut arming, 0, 10), [ArmingMessage::Arm]);
+            assert_eq!(arming.hear(false, true, Some(5), 10_000), None);
+            if tells_epoch {
+                assert_eq!(arming.hear(false, false, Some(6), 20_000), Some(ArmingEnd::Overtaken));
+            } else {
+                assert!(arming.give_up());
+            }
+            assert_eq!(said(&mut arming, 20, 3000), []);
+            assert!(!arming.take_ignored());
+        }
+        assert!(!Arming::default().give_up());
     }
 }

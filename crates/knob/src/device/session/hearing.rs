@@ -1,9 +1,10 @@
 //! What the host makes of the device's messages: the receiving half of [`HostSession`].
 
+use super::arming::ArmingEnd;
 use super::trust::Expected;
 use super::{
     HostSession, Incoming, LONGEST_PERIOD_US, Notice, PLAIN_GAP_US, PLAIN_PERIOD_US, SessionEvent,
-    StateSample,
+    StateSample, ZERO_IS_LOST,
 };
 use crate::device::session::slaps::Slaps;
 use crate::device::transport::Binding;
@@ -94,6 +95,7 @@ impl HostSession {
         if self.info.replace(*info).is_none() {
             self.notice = self.notice.take().filter(|notice| !matches!(notice, Notice::AnswersAnother));
             self.rate_due = self.binding == Binding::Serial;
+            self.is_dated = false;
             self.feeling.forget();
             // What had piled up on the line before anybody read it is no loss of this session.
             match &mut self.ears {
@@ -105,8 +107,10 @@ impl HostSession {
 
     fn hear_state(&mut self, state: &DeviceState, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
         if self.clock.observe(state.t_us, now_us) && self.info.is_some() {
-            self.notice = Some(Notice::Told("the knob has restarted and is disarmed".into()));
-            self.arming.disarm(now_us);
+            self.notice =
+                Some(Notice::Told(format!("the knob has restarted and is disarmed; {ZERO_IS_LOST}")));
+            self.take_away(now_us);
+            self.is_zero_known = false;
             self.trust.restart();
             self.feeling.forget();
             self.slaps = Slaps::default();
@@ -123,13 +127,27 @@ impl HostSession {
         let host_us = self.clock.host_us(state.t_us).unwrap_or(now_us);
         self.meter.state(now_us - host_us);
         self.state = Some((*state, now_us));
+        self.is_dated = self.info.is_some();
         self.slaps.state(state.slaps, now_us);
         let is_played = self.judge(state, now_us);
-        self.zeroing.hear(state.angle_deg(), VELOCITY_DEG_S * f64::from(state.velocity), now_us);
+        if self.zeroing.hear(state.angle_deg(), VELOCITY_DEG_S * f64::from(state.velocity), now_us) {
+            self.zeros = self.zeros.wrapping_add(1);
+            self.is_zero_known = true;
+        }
         let is_probing = state.flags.has(wire::Flags::PROBING);
-        if self.arming.hear(state.flags.armed(), is_probing, now_us) && self.notice.is_none() {
-            let why = state.fault_code().map_or("the knob has disarmed itself", |code| code.text());
-            self.notice = Some(Notice::Told(format!("disarmed: {why}")));
+        let end = self.arming.hear(state.flags.armed(), is_probing, state.epoch, now_us);
+        if let Some(end) = end {
+            self.zeroing.forget();
+            // Its EVENT says it better, before or after this.
+            if self.notice.is_none() {
+                let why = state.fault_code().map_or("the knob has disarmed itself", |code| code.text());
+                let so = if end == ArmingEnd::Disarmed { "disarmed" } else { "not armed" };
+                self.notice = Some(Notice::Told(format!("{so}: {why}")));
+            }
+        }
+        if self.arming.is_armed() {
+            self.is_zero_known = true;
+            self.zeroing.forget();
         }
         if let Some(round_trip_us) = self.feeling.echoed(state.feel_id, now_us) {
             self.meter.feel_echoed(round_trip_us);
@@ -172,6 +190,14 @@ impl HostSession {
         (self.mean_step_us / 500.0).round().max(1.0) as u32 * 500
     }
 
+    /// The knob tells why it makes no torque. An ARM that is said again would answer what came before.
+    fn gives_up(&mut self, why: String) {
+        if self.arming.give_up() {
+            self.zeroing.forget();
+        }
+        self.notice = Some(Notice::Told(why));
+    }
+
     fn hear_event(&mut self, event: &DeviceEvent, tell: &mut dyn FnMut(SessionEvent)) {
         if self.last_event.replace(event.counter) == Some(event.counter) {
             return;
@@ -184,10 +210,10 @@ impl HostSession {
             }
             EventKind::Button => tell(SessionEvent::Button(event.value > 0.5)),
             EventKind::Limit => {}
-            EventKind::Fault => self.notice = Some(Notice::Told(format!("fault: {text}"))),
+            EventKind::Fault => self.gives_up(format!("fault: {text}")),
             // Of FREE this side knows the reason better.
             EventKind::Disarmed if event.code == wire::FaultCode::Free as u8 => {}
-            EventKind::Disarmed => self.notice = Some(Notice::Told(format!("disarmed: {text}"))),
+            EventKind::Disarmed => self.gives_up(format!("disarmed: {text}")),
             // The codes up to 7 are about FEEL, of which the one refused is named.
             EventKind::Refused if event.code <= RefusedCode::LawUnknown as u8 => {
                 if self.feeling.refused(event.feel_id) {

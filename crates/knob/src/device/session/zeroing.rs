@@ -6,6 +6,8 @@
 
 /// ZERO that shows no effect is said again after this much, us.
 const INSIST_US: i64 = 50_000;
+/// ZERO that could not be said for this long is forgotten, us: FREE, for which it may wait, has had its effect ten times over.
+const PATIENCE_US: i64 = 500_000;
 /// ZERO of one act at most.
 const TRIES: u32 = 4;
 /// As far from zero as this, degrees, and what the knob turns meanwhile, it has been heard: a hand on the knob is not still, and a
@@ -17,8 +19,8 @@ enum Goal {
     /// The user wants none.
     #[default]
     None,
-    /// To be said, as soon as it may.
-    Due,
+    /// To be said, as soon as it may; since when, once time has passed, us.
+    Due { since_us: Option<i64> },
     /// Said so often, the last time then, us.
     Said { tries: u32, at_us: i64 },
 }
@@ -34,7 +36,7 @@ pub struct Zeroing {
 impl Zeroing {
     /// The user wants the present position to be zero.
     pub fn want(&mut self) {
-        self.goal = Goal::Due;
+        self.goal = Goal::Due { since_us: None };
     }
 
     /// It comes too late.
@@ -52,20 +54,29 @@ impl Zeroing {
         std::mem::take(&mut self.is_ignored)
     }
 
-    /// Takes in where the knob says that it is, and how fast it turns.
-    pub fn hear(&mut self, angle_deg: f64, velocity_deg_s: f64, now_us: i64) {
-        if let Goal::Said { at_us, .. } = self.goal {
-            let turned_deg = velocity_deg_s.abs() * 1e-6 * (now_us - at_us) as f64;
-            if angle_deg.abs() <= NEAR_DEG + turned_deg {
-                self.goal = Goal::None;
-            }
+    /// Takes in where the knob says that it is, and how fast it turns. True when that shows that ZERO has been heard.
+    pub fn hear(&mut self, angle_deg: f64, velocity_deg_s: f64, now_us: i64) -> bool {
+        let Goal::Said { at_us, .. } = self.goal else { return false };
+        let turned_deg = velocity_deg_s.abs() * 1e-6 * (now_us - at_us) as f64;
+        let is_heard = angle_deg.abs() <= NEAR_DEG + turned_deg;
+        if is_heard {
+            self.goal = Goal::None;
         }
+        is_heard
     }
 
-    /// Whether ZERO is to be said now.
-    pub fn poll(&mut self, now_us: i64) -> bool {
+    /// Whether ZERO is to be said now, if it may be said.
+    pub fn poll(&mut self, may_be_said: bool, now_us: i64) -> bool {
+        if !may_be_said {
+            if let Goal::Due { since_us } = &mut self.goal
+                && now_us - *since_us.get_or_insert(now_us) > PATIENCE_US
+            {
+                (self.goal, self.is_ignored) = (Goal::None, true);
+            }
+            return false;
+        }
         let tries = match self.goal {
-            Goal::Due => 0,
+            Goal::Due { .. } => 0,
             Goal::Said { tries, at_us } if now_us - at_us >= INSIST_US => tries,
             Goal::None | Goal::Said { .. } => return false,
         };
@@ -81,7 +92,7 @@ mod tests {
     use super::*;
 
     fn said(zeroing: &mut Zeroing, from_ms: i64, to_ms: i64) -> usize {
-        (from_ms..to_ms).filter(|ms| zeroing.poll(1_000 * ms)).count()
+        (from_ms..to_ms).filter(|ms| zeroing.poll(true, 1_000 * ms)).count()
     }
 
     #[test]
@@ -90,10 +101,10 @@ mod tests {
         assert_eq!(said(&mut zeroing, 0, 100), 0);
         zeroing.want();
         assert_eq!(said(&mut zeroing, 100, 110), 1);
-        zeroing.hear(200.0, 0.0, 110_000);
-        assert!(zeroing.is_pending(), "this was on its way already");
-        zeroing.hear(0.4, 0.0, 120_000);
-        assert!(!zeroing.is_pending());
+        assert!(!zeroing.hear(200.0, 0.0, 110_000), "this was on its way already");
+        assert!(zeroing.is_pending());
+        assert!(zeroing.hear(0.4, 0.0, 120_000));
+        assert!(!zeroing.is_pending() && !zeroing.hear(0.4, 0.0, 121_000));
         assert_eq!((said(&mut zeroing, 120, 1_000), zeroing.take_ignored()), (0, false));
     }
 
@@ -103,7 +114,7 @@ mod tests {
         zeroing.want();
         for ms in 0..1_000 {
             zeroing.hear(200.0, 30.0, 1_000 * ms);
-            assert_eq!(zeroing.poll(1_000 * ms), [0, 50, 100, 150].contains(&ms), "{ms}");
+            assert_eq!(zeroing.poll(true, 1_000 * ms), [0, 50, 100, 150].contains(&ms), "{ms}");
             assert_eq!(zeroing.take_ignored(), ms == 200);
         }
         assert!(!zeroing.is_pending());
@@ -113,10 +124,21 @@ mod tests {
     fn a_knob_that_turns_on_meanwhile_has_heard_it() {
         let mut zeroing = Zeroing::default();
         zeroing.want();
-        assert!(zeroing.poll(0));
+        assert!(zeroing.poll(true, 0));
         zeroing.hear(300.0, 200.0, 20_000);
         assert!(zeroing.is_pending());
         zeroing.hear(8.0, 200.0, 20_000);
         assert!(!zeroing.is_pending());
+    }
+
+    #[test]
+    fn what_cannot_be_said_soon_is_never_said() {
+        let mut zeroing = Zeroing::default();
+        zeroing.want();
+        for ms in 0..=500 {
+            assert!(!zeroing.poll(false, 1_000 * ms) && zeroing.is_pending(), "{ms}");
+        }
+        assert!(!zeroing.poll(false, 501_000) && zeroing.take_ignored());
+        assert_eq!(said(&mut zeroing, 502, 2_000), 0);
     }
 }
