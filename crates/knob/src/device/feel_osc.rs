@@ -2,7 +2,8 @@
 //!
 //! Each field goes to `/chalumeau/feel/<field>`, named as in `docs/protocol.md` but for `H` and `k`, which keep the seed's
 //! letters, and TorqueTuner's own words `scale`, `stretch`, `offset`, `damping`. All fields are one bundle: on change, at
-//! most 100 a second, and once a second. Nothing of safety travels this way: the bridge's other end keeps its own limits.
+//! most 100 a second, and once a second. The end is a bundle without torque and then silence, in which the bridge takes the
+//! torque away by itself. Whoever sends decides when ([`link`](crate::device::link)); the bridge's other end keeps its own limits.
 
 use crate::wire::Feel;
 use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType, encoder};
@@ -15,11 +16,16 @@ const LEAST_US: i64 = 10_000;
 /// A bundle is sent again after this much, us.
 const AGAIN_US: i64 = 1_000_000;
 
-/// Sends the feel to one address.
+/// Bundles without torque at the end, for UDP may lose one.
+const RESTS: u8 = 3;
+
+/// Sends the feel to one address. Dropped, it takes the torque away.
 pub struct FeelSender {
     socket: UdpSocket,
     to: SocketAddr,
     last: Option<(Feel, i64)>,
+    /// The end that is still to be said again: so often, the last time then, us.
+    rests: Option<(Feel, u8, i64)>,
 }
 
 impl FeelSender {
@@ -28,7 +34,7 @@ impl FeelSender {
         let any = if to.is_ipv4() { Ipv4Addr::UNSPECIFIED.into() } else { Ipv6Addr::UNSPECIFIED.into() };
         let socket = UdpSocket::bind(SocketAddr::new(any, 0))?;
         socket.set_nonblocking(true)?;
-        Ok(Self { socket, to, last: None })
+        Ok(Self { socket, to, last: None, rests: None })
     }
 
     /// Sends `feel` if it is new or due again; what the network refuses is lost, as all of UDP may be.
@@ -38,10 +44,50 @@ impl FeelSender {
             let since_us = now_us - at;
             since_us >= AGAIN_US || (last != feel && since_us >= LEAST_US)
         });
-        if is_due && let Ok(datagram) = encoder::encode(&bundle(&feel)) {
-            self.last = Some((feel, now_us));
+        if is_due {
+            (self.last, self.rests) = (Some((feel, now_us)), None);
+            self.say(&feel);
+        }
+    }
+
+    /// No torque, and then silence. A bridge that was told nothing hears nothing.
+    pub fn rest(&mut self, now_us: i64) {
+        if let Some((last, _)) = self.last.take() {
+            self.rests = Some((limp(last), RESTS, i64::MIN));
+        }
+        if let Some((feel, left, at_us)) = self.rests
+            && now_us >= at_us.saturating_add(LEAST_US)
+        {
+            self.rests = (left > 1).then_some((feel, left - 1, now_us));
+            self.say(&feel);
+        }
+    }
+
+    fn say(&self, feel: &Feel) {
+        if let Ok(datagram) = encoder::encode(&bundle(feel)) {
             let _ = self.socket.send_to(&datagram, self.to);
         }
+    }
+}
+
+impl Drop for FeelSender {
+    fn drop(&mut self) {
+        if let Some((last, _)) = self.last {
+            self.say(&limp(last));
+        }
+    }
+}
+
+/// The same without anything that makes torque.
+fn limp(feel: Feel) -> Feel {
+    Feel {
+        scale_mnm: 0.0,
+        wall_mnm_per_deg: 0.0,
+        slap_mnm_per_deg: 0.0,
+        damping_mnms: 0.0,
+        friction: 0,
+        detent: 0,
+        ..feel
     }
 }
 

@@ -3,6 +3,7 @@
 //! Other threads talk to it in three ways: commands go through a queue, samples leave through the ring of the
 //! [`KnobReader`], and screens copy a status behind a lock. The audio thread only has the reader.
 
+mod bridged;
 mod connection;
 mod status;
 mod worker;
@@ -143,7 +144,8 @@ impl KnobLink {
         self.tell(LinkCommand::TakeOver);
     }
 
-    /// Also sends the feel as OSC to this address, see [`feel_osc`](crate::device::feel_osc).
+    /// Also sends the feel as OSC to this address while the knob is armed, see [`feel_osc`](crate::device::feel_osc). A knob
+    /// that can only be read is armed for this alone.
     pub fn feel_osc(&self, to: Option<SocketAddr>) {
         self.tell(LinkCommand::FeelOsc(to));
     }

@@ -112,6 +112,13 @@ pub struct LinkStatus {
     pub port: String,
     /// True while the knob is armed.
     pub armed: bool,
+    /// True while the knob has been told to arm and has not done so yet: it may turn, to test its signs.
+    pub arming: bool,
+    /// How often the knob has shown in this connection that it has heard ZERO.
+    pub zeros: u32,
+    /// How far it stands from a zero that nobody has set or armed at since it was connected or has restarted, degrees, if
+    /// that is more than 5: armed there, it may turn back by itself.
+    pub stray_deg: Option<f32>,
     /// Most torque allowed, mNm, as the last ARM set it.
     pub ceiling_mnm: u16,
     /// Why something that was wanted did not happen; the latest.

@@ -4,6 +4,7 @@ use crate::device::discover;
 use crate::device::discover::Candidate;
 use crate::device::feel_osc::FeelSender;
 use crate::device::heartbeat::Monitor;
+use crate::device::link::bridged::BridgedFeel;
 use crate::device::link::connection::{Connection, ConnectionEnd, Outlet};
 use crate::device::link::status::{LinkStatus, Phase};
 use crate::device::link::{Hooks, KnobChoice};
@@ -14,7 +15,7 @@ use crate::device::osc::OscTransport;
 use crate::device::reader::KnobWriter;
 use crate::device::runtime_dir::{RuntimeDir, serial_text};
 use crate::device::serial::{OpenError, SerialTransport};
-use crate::device::session::SessionStatus;
+use crate::device::session::{SessionStatus, ZERO_IS_LOST};
 use crate::device::stats::LinkStats;
 use crate::device::transport::Transport;
 use std::hash::{BuildHasher, RandomState};
@@ -83,7 +84,7 @@ pub struct Worker {
     openings: u64,
     choice: KnobChoice,
     connection: Option<Connection>,
-    feel_sender: Option<FeelSender>,
+    bridged: BridgedFeel,
     /// What keeps the knob away; shown while there is no connection.
     trouble: Phase,
     /// Serial number of the knob another instance has.
@@ -91,6 +92,8 @@ pub struct Worker {
     last_serial: Option<u64>,
     last_port: String,
     lost_us: Option<i64>,
+    /// A knob that was lost is back, and has been neither zeroed nor armed since.
+    has_returned: bool,
     losses: u32,
     next_try_us: i64,
     retry_us: i64,
@@ -135,12 +138,13 @@ impl Worker {
             openings: 0,
             choice: KnobChoice::Off,
             connection: None,
-            feel_sender: None,
+            bridged: BridgedFeel::default(),
             trouble: Phase::Off,
             held: None,
             last_serial: None,
             last_port: String::new(),
             lost_us: None,
+            has_returned: false,
             losses: 0,
             next_try_us: 0,
             retry_us: RETRY_LEAST_US,
@@ -168,9 +172,9 @@ impl Worker {
             self.watch_heartbeats();
             let feel = (self.hooks.feel)();
             let now_us = self.now_us();
-            if let (Some(sender), Some(feel)) = (&mut self.feel_sender, &feel) {
-                sender.poll(feel, now_us);
-            }
+            let session = self.connection.as_mut().and_then(Connection::session);
+            let armed_mnm = session.filter(|session| session.is_armed()).map(|session| session.ceiling_mnm());
+            self.bridged.poll(feel.as_ref(), armed_mnm, now_us);
             if self.connection.is_none() && now_us >= self.next_try_us && self.choice != KnobChoice::Off {
                 self.try_open(now_us);
             }
@@ -199,10 +203,12 @@ impl Worker {
         self.epoch.elapsed().as_micros() as i64
     }
 
-    /// Tells the session who still obeys the user.
+    /// Tells the session, or what goes to a bridge, who still obeys the user.
     fn watch_heartbeats(&mut self) {
         let now_us = self.now_us();
         let pulse = self.monitor.look(now_us);
+        let is_heard = self.is_stock_heard(now_us);
+        self.bridged.watch(&pulse, is_heard, now_us);
         let Some(session) = self.connection.as_mut().and_then(Connection::session) else { return };
         match pulse.oldest {
             Some((at_us, who)) => session.obeyed(at_us, who),
@@ -211,6 +217,24 @@ impl Worker {
         if let Some(release) = pulse.released {
             session.let_go(release.text(), now_us);
         }
+    }
+
+    fn is_stock_heard(&self, now_us: i64) -> bool {
+        self.connection.as_ref().is_some_and(|connection| connection.is_stock_heard(now_us))
+    }
+
+    /// Arms a knob that has no session, by way of a bridge.
+    fn arm_bridged(&mut self, ceiling_mnm: u16, further_act: bool, now_us: i64) -> Result<(), String> {
+        if self.connection.is_none() {
+            return Err("not armed: no knob is connected".into());
+        }
+        if !self.bridged.is_there() {
+            return Err("not armed: this knob's firmware can only be read. Only a bridge to libmapper gives it a feel: \
+                        Feel OSC port, docs/touch.md"
+                .into());
+        }
+        let (pulse, is_heard) = (self.monitor.look(now_us), self.is_stock_heard(now_us));
+        self.bridged.arm(ceiling_mnm, further_act, &pulse, is_heard, now_us)
     }
 
     fn rest(&self) -> Duration {
@@ -244,17 +268,13 @@ impl Worker {
                     None => session.arm(ceiling_mnm, further_act, now_us),
                 }
             }
-            (LinkCommand::Arm { .. }, None) => {
-                let why = if self.connection.is_some() {
-                    "this knob's firmware can only be read"
-                } else {
-                    "no knob is connected"
-                };
-                self.refusal = Some(format!("not armed: {why}"));
+            (LinkCommand::Arm { ceiling_mnm, further_act }, None) => {
+                self.refusal = self.arm_bridged(ceiling_mnm, further_act, now_us).err();
             }
             (LinkCommand::LowerCeiling(ceiling_mnm), Some(session)) => session.lower_ceiling(ceiling_mnm),
+            (LinkCommand::LowerCeiling(ceiling_mnm), None) => self.bridged.lower(ceiling_mnm),
             (LinkCommand::Disarm, Some(session)) => session.disarm(now_us),
-            (LinkCommand::LowerCeiling(_) | LinkCommand::Disarm, None) => {}
+            (LinkCommand::Disarm, None) => self.bridged.disarm(),
             (LinkCommand::Zero, _) => {
                 if let Some(connection) = &mut self.connection {
                     connection.zero();
@@ -262,13 +282,14 @@ impl Worker {
             }
             (LinkCommand::TakeOver, _) => self.take_over(now_us),
             (LinkCommand::FeelOsc(to), _) => {
-                self.feel_sender = to.and_then(|to| match FeelSender::new(to) {
+                let sender = to.and_then(|to| match FeelSender::new(to) {
                     Ok(sender) => Some(sender),
                     Err(e) => {
                         self.refusal = Some(format!("the feel cannot be sent to {to}: {e}"));
                         None
                     }
                 });
+                self.bridged.send_to(sender);
             }
         }
         self.publish(true);
@@ -281,6 +302,7 @@ impl Worker {
         self.close();
         self.trouble = if choice == KnobChoice::Off { Phase::Off } else { Phase::Searching };
         (self.held, self.last_serial, self.lost_us, self.refusal) = (None, None, None, None);
+        self.has_returned = false;
         (self.next_try_us, self.retry_us, self.cursor, self.taking_until_us) =
             (0, RETRY_LEAST_US, 0, i64::MIN);
         self.last_port.clear();
@@ -296,6 +318,7 @@ impl Worker {
     }
 
     fn close(&mut self) {
+        self.bridged.disarm();
         if let Some(connection) = self.connection.take() {
             connection.close();
         }
@@ -314,6 +337,9 @@ impl Worker {
             )
         });
         if is_live || is_stock {
+            let is_settled =
+                session.as_ref().is_some_and(|session| session.zeros() > 0 || session.is_armed());
+            self.has_returned = (self.has_returned || self.lost_us.is_some()) && !is_settled;
             self.last_serial =
                 session.and_then(|session| session.info().map(|info| info.serial)).or(self.last_serial);
             (self.lost_us, self.held, self.retry_us) = (None, None, RETRY_LEAST_US);
@@ -324,6 +350,7 @@ impl Worker {
     fn ended(&mut self, end: ConnectionEnd) {
         let now_us = self.now_us();
         let Some(mut connection) = self.connection.take() else { return };
+        self.bridged.disarm();
         let port = connection.port();
         let was_there = connection.session().is_none_or(|session| session.heard_us().is_some());
         self.next_try_us = now_us + RETRY_LEAST_US;
@@ -523,7 +550,11 @@ impl Worker {
             Some(connection) => {
                 status.angle_deg = connection.last().map(|state| state.angle_deg);
                 status.button = connection.button();
-                status.notice = connection.stock_notice();
+                status.notice =
+                    connection.stock_notice().or_else(|| self.bridged.notice().map(str::to_owned));
+                status.armed = self.bridged.ceiling_mnm().is_some();
+                status.ceiling_mnm = self.bridged.ceiling_mnm().unwrap_or_default();
+                status.restriction = self.bridged.warning().map(str::to_owned);
                 let is_stock_heard = connection.is_stock_heard(now_us);
                 match connection.session() {
                     None if is_stock_heard => Phase::ReadOnly,
@@ -531,10 +562,15 @@ impl Worker {
                     Some(session) => {
                         status.info = session.info().copied();
                         status.serial = status.info.map(|info| info.serial);
-                        status.armed = session.is_armed();
+                        (status.armed, status.arming) = (session.is_armed(), session.is_arming());
+                        (status.zeros, status.stray_deg) =
+                            (session.zeros(), session.stray_deg().map(|deg| deg as f32));
                         status.ceiling_mnm = session.ceiling_mnm();
                         status.is_slow = session.is_slow();
-                        status.notice = session.notice().map(str::to_owned);
+                        let returned = self
+                            .has_returned
+                            .then(|| format!("the knob is back; if it has restarted, {ZERO_IS_LOST}"));
+                        status.notice = session.notice().map(str::to_owned).or(returned);
                         (status.alarm, status.restriction) = (session.alarm(), session.restriction());
                         if let Some(refusal) = session.refusal() {
                             status.last_refusal = Some(refusal.into());
