@@ -20,8 +20,9 @@ firmware clips torque at 0.1 N m (20.8 counts). For the Mechaduino board 208 cou
 documented. The firmware has no reed law: Scale and Stretch act on the curve of the current mode, and Offset only when a
 mode begins. In its mode Free, Scale is a constant torque that spins the knob: choose the mode before you start this
 program. That firmware has no watchdog and no torque limit. This program therefore sends nothing above --ceiling; raises
-Scale from 0 by at most 400 mNm a second once the map is made; and sets Scale and Damping to 0 when no feel has arrived for 3 seconds, and at the
-end (Ctrl-C). If this program, its machine or the network fails, the knob keeps the last torque: keep its power switch
+Scale from 0 by at most 400 mNm a second once the map is made; and sets Scale and Damping to 0 when Chalumeau says so (it
+sends a feel only while Arm is on), when no feel has arrived for 3 seconds, and at the end of this program (Ctrl-C, a closed
+terminal, an error). If this program is killed, or its machine or the network fails, the knob keeps the last torque: keep its power switch
 at hand. A knob that comes back is mapped again; one that vanished without logging off only after libmapper has dropped
 it, which takes half a minute.
 
@@ -361,8 +362,10 @@ def arguments():
 def main():
     args = arguments()
     stop = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.append(True))
+    # A terminal that is closed sends SIGHUP; Windows has none.
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: stop.append(True))
     targets = torquetuner(args.counts_per_nm) if args.map else {}
     bridge = Bridge(limits_for(args.ceiling, targets))
     family = socket.AF_INET6 if ":" in args.listen[0] else socket.AF_INET
@@ -379,10 +382,14 @@ def main():
             print(reason, file=sys.stderr)
             return 2
         host, port = receiver.getsockname()[:2]
-        print(f"{signals.name()} on {signals.graph.interface}, feel from {host}:{port}; Ctrl-C ends", flush=True)
-        serve(receiver, signals, bridge, Wiring(signals, args.map, targets) if args.map else None, stop)
-        signals.send(bridge.off())
-        signals.free()
+        wiring = Wiring(signals, args.map, targets) if args.map else None
+        try:
+            print(f"{signals.name()} on {signals.graph.interface}, feel from {host}:{port}; Ctrl-C ends", flush=True)
+            serve(receiver, signals, bridge, wiring, stop)
+        finally:
+            # However it ends, also where the terminal is gone and printing fails.
+            signals.send(bridge.off())
+            signals.free()
     print(f"\n{bridge.taken} feels passed on, {bridge.refused} refused, {bridge.ignored} ignored")
     return 0
 

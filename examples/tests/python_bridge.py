@@ -115,8 +115,8 @@ class Bridge:
         status = pathlib.Path(f"/proc/{self.process.pid}/status")
         return int(re.search(r"VmRSS:\s+(\d+)", status.read_text()).group(1))
 
-    def interrupt(self):
-        self.process.send_signal(signal.SIGINT)
+    def interrupt(self, how=signal.SIGINT):
+        self.process.send_signal(how)
         code = self.process.wait(PATIENCE_S)
         self.thread.join()
         self.socket.close()
@@ -186,6 +186,71 @@ def feel_reaches_a_torquetuner_in_its_units():
         bridge.kill()
         knob.close()
     assert code == 0, bridge
+
+
+def every_end_but_a_kill_switches_torque_off():
+    ends = [signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+    for number, how in enumerate(ends):
+        knob, bridge = mapped(f"ChalumeauTestF{number}")
+        try:
+            code = bridge.interrupt(how)
+            off = lambda: (knob.last("Scale"), knob.last("Damping")) == (0, 0)  # noqa: E731
+            wait(off, f"torque off after {how.name}", bridge)
+        finally:
+            bridge.kill()
+            knob.close()
+        assert code == 0, bridge
+
+
+def an_error_switches_torque_off():
+    """What cannot happen, happens: the program stumbles over a datagram."""
+    said = []
+
+    class Signals:
+        graph = type("Graph", (), {"interface": "none"})
+
+        def __init__(self, *_):
+            pass
+
+        def name(self):
+            return "double"
+
+        def send(self, values):
+            said.append(values)
+
+        def free(self):
+            said.append("free")
+
+    kept = libmapper_bridge.Signals, libmapper_bridge.serve, sys.argv
+    handlers = {name: signal.getsignal(getattr(signal, name)) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
+
+    def stumble(*_):
+        raise RuntimeError("stumbled")
+
+    libmapper_bridge.Signals, libmapper_bridge.serve = Signals, stumble
+    sys.argv = ["libmapper_bridge.py", "--listen", "127.0.0.1:0"]
+    try:
+        libmapper_bridge.main()
+        raise AssertionError("the error is told")
+    except RuntimeError:
+        pass
+    finally:
+        libmapper_bridge.Signals, libmapper_bridge.serve, sys.argv = kept
+        for name, handler in handlers.items():
+            signal.signal(getattr(signal, name), handler)
+    assert said == [{"scale": 0.0, "damping": 0.0}, "free"], said
+
+
+def what_chalumeau_says_at_the_end_is_passed_on_at_once():
+    """The bundle that Chalumeau sends when the knob is let go, as crates/knob/src/device/feel_osc.rs makes it."""
+    limits = libmapper_bridge.limits_for(100.0, libmapper_bridge.torquetuner(208.0))
+    bridge = libmapper_bridge.Bridge(limits)
+    bridge.take(bundle(**PLAYED), 0.0)
+    bridge.due(0.01, 1.0)
+    off = {"scale": 0.0, "wall_mnm_per_deg": 0.0, "slap_mnm_per_deg": 0.0, "damping": 0.0, "friction": 0.0, "detent": 0.0}
+    bridge.take(bundle(**PLAYED | off), 0.02)
+    due = bridge.due(0.03, 0.01)
+    assert bridge.refused == 0 and {name: due[name] for name in off} == off, due
 
 
 def silence_switches_torque_off():
@@ -362,6 +427,9 @@ TESTS = [
     packets_of_any_kind_do_no_harm_to_the_decoder,
     what_the_bridge_cannot_do_is_said,
     feel_reaches_a_torquetuner_in_its_units,
+    every_end_but_a_kill_switches_torque_off,
+    an_error_switches_torque_off,
+    what_chalumeau_says_at_the_end_is_passed_on_at_once,
     silence_switches_torque_off,
     a_knob_that_comes_back_is_mapped_again,
     what_is_out_of_range_is_refused_whole,

@@ -45,6 +45,20 @@ CLAIM(i2c_frames_come_back_and_any_byte_changed_is_refused) {
     }
 }
 
+CLAIM(i2c_frame_of_a_line_shorted_to_ground_is_none) {
+    const std::uint8_t silent[I2C_FRAME] = {};
+    for (MotorBoard board : {MotorBoard::Mechaduino, MotorBoard::Moteus}) {
+        MotorReading reading{123, 4.0F};
+        CHECK(!decode_reading(board, silent, reading) && reading.angle == 123);
+        // The smallest angle beside it is one.
+        std::uint8_t frame[I2C_FRAME];
+        encode_reading(board, {1, 0.0F}, frame);
+        CHECK(decode_reading(board, frame, reading) && reading.angle == 1);
+    }
+    MotorCommand command;
+    CHECK(!decode_command(silent, command));
+}
+
 CLAIM(counts_are_the_nearest_and_never_exceed_what_the_board_takes) {
     const TorqueUnit mechaduino = mechaduino_unit(60.0F);
     for (const TorqueUnit& unit : {MOTEUS_UNIT, mechaduino}) {

@@ -42,11 +42,20 @@ inline void seal(std::uint8_t* frame) {
     frame[11] = static_cast<std::uint8_t>(sum >> 8U);
 }
 
-inline bool sealed(const std::uint8_t* frame) { return Bytes(frame + 10).u16() == byte_sum(frame); }
+/// Whether the sum is right. A frame of twelve zeros has a right sum too, and is what a data line shorted to ground reads as:
+/// it is none. A board that rests at the very tenth of a degree of its own zero, and tells a speed of exactly 0, would send
+/// the same; there the knob counts as failed, which is the safe side.
+inline bool sealed(const std::uint8_t* frame) {
+    std::uint8_t any = 0;
+    for (std::size_t i = 0; i < I2C_FRAME; ++i) {
+        any = static_cast<std::uint8_t>(any | frame[i]);
+    }
+    return any != 0 && Bytes(frame + 10).u16() == byte_sum(frame);
+}
 
 constexpr std::size_t angle_at(MotorBoard board) { return board == MotorBoard::Mechaduino ? 0 : 1; }
 
-/// False when the sum is wrong; a failure for the device to count.
+/// False when the sum is wrong or every byte is 0; a failure for the device to count.
 inline bool decode_reading(MotorBoard board, const std::uint8_t* frame, MotorReading& reading) {
     if (!sealed(frame)) {
         return false;

@@ -110,7 +110,7 @@ TaskHandle_t haptic_task = nullptr;
 CountRounding rounding;
 Reading reading;
 
-/// Reads angle and speed; false when the frame is short or its sum is wrong.
+/// Reads angle and speed; false when the frame is short, its sum is wrong or all of it is 0.
 bool read_motor() {
     std::uint8_t frame[I2C_FRAME];
     std::size_t length = Wire.requestFrom(MOTOR_ADDRESS, static_cast<std::uint8_t>(sizeof frame));
