@@ -17,7 +17,11 @@ export class KnobPanel {
     Object.assign(this, { engine, workshop, question, say, on, plays: false, asked: '' });
     this.knob = new Knob((message) => engine.send(message), (status) => this.show(status));
     get('knob').onclick = () => this.toggle();
-    get('knob-arm').onclick = (event) => this.knob.arm(event, this.ceiling);
+    get('knob-arm').onclick = (event) => {
+      this.warned = this.knob.arm(event, this.ceiling);
+      if (this.warned) get('knob-who').textContent = this.warned;
+      this.become(this.knob.isLive, this.knob.isArmed, this.knob.isWanted);
+    };
     get('knob-stop').onclick = () => this.stop();
     // Pressed counts, not let go: nobody waits for a click.
     get('knob-stop').onpointerdown = () => this.stop();
@@ -27,7 +31,8 @@ export class KnobPanel {
       this.update();
     };
     addEventListener('keydown', (event) => {
-      if (!this.knob.port || !this.knob.isArmed || !['Escape', 'Space'].includes(event.code)) return;
+      // An arming knob, too: the status tells of its torque only ten times a second.
+      if (!this.knob.port || !this.knob.mayTurn || !['Escape', 'Space'].includes(event.code)) return;
       // Space must not press the button that has the focus.
       event.preventDefault();
       this.stop();
@@ -68,14 +73,16 @@ export class KnobPanel {
       get('knob-panel').hidden = !status.connected;
       document.body.classList.toggle('with-knob', status.connected);
       this.asked = '';
-      if (!status.connected) this.become(false, false);
+      this.warned = '';
+      if (!status.connected) this.become(false, false, false);
       if (status.who) this.say(`Knob: ${status.who}.`);
       if (status.connected) get('knob-who').textContent = 'Waiting for an answer …';
       return;
     }
-    this.become(status.live, status.armed);
+    this.become(status.live, status.armed, status.wanted);
     const warning = status.alarm || status.restriction || '';
-    const said = [status.who, warning, status.refusal, this.refused, status.notice].filter(Boolean);
+    if (status.armed || status.wanted || !this.knob.isWarned) this.warned = '';
+    const said = [status.who, warning, this.warned, status.refusal, this.refused, status.notice].filter(Boolean);
     if (status.live && !status.armed && said.length === 1) said.push(BEFORE);
     get('knob-who').textContent = said.join(' · ');
     get('knob-who').classList.toggle('failed', Boolean(status.alarm));
@@ -84,11 +91,11 @@ export class KnobPanel {
     this.update();
   }
 
-  become(live, armed) {
+  become(live, armed, wanted) {
     get('knob').classList.toggle('blowing', Boolean(armed));
     get('knob-panel').classList.toggle('armed', Boolean(armed));
-    get('knob-arm').disabled = !live || armed;
-    get('knob-zero').disabled = !live || armed;
+    get('knob-arm').disabled = !live || armed || wanted;
+    get('knob-zero').disabled = !live || armed || wanted;
   }
 
   /** Whether the knob makes the breath, as the sound's picture has it. */

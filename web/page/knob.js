@@ -21,13 +21,13 @@ export const WHERE = 'A knob needs Web Serial, which Chrome, Edge and Opera have
 export class Knob {
   /** `send` goes to the worklet; `on` gets the status, see `hear`. */
   constructor(send, on) {
-    Object.assign(this, { send, on, port: null, decoder: new TextDecoder(), opened: 0, limits: '' });
+    Object.assign(this, { send, on, port: null, decoder: new TextDecoder(), opened: 0, limits: '', isWanted: false, isWarned: false });
     document.addEventListener('visibilitychange', () => document.hidden && this.free(HIDDEN));
     addEventListener('pagehide', () => this.leave());
     addEventListener('beforeunload', () => this.leave());
     // A knob that is plugged in again is found again, not armed.
     globalThis.navigator.serial?.addEventListener?.('connect', ({ target }) => {
-      if (this.wanted && !this.port && this.isOurs(target)) this.open(target).catch(() => {});
+      if (this.wanted && !this.port && this.isOurs(target)) this.open(target).then(() => (this.isBack = true)).catch(() => {});
     });
   }
 
@@ -96,21 +96,28 @@ export class Knob {
     if (message.knobBaud) this.changeSpeed(message.knobBaud);
     if (message.knobStatus && this.port) {
       this.heardAt = performance.now();
-      const [live, armed, ceiling, angle, torque, feel, most, stiffness, push, who, alarm, restriction, refusal, notice] = this.decoder.decode(message.knobStatus).split('\n');
+      const [live, armed, ceiling, angle, torque, feel, most, stiffness, push, who, alarm, restriction, refusal, notice, arming, stray] = this.decoder.decode(message.knobStatus).split('\n');
       this.isLive = live === '1';
       this.isArmed = armed === '1';
+      // A status that was made before the act says nothing of it.
+      if (arming === '1') this.isSeen = true;
+      if (this.isArmed || (arming !== '1' && (this.isSeen || performance.now() - this.wantedAt > DEAF_MS))) this.isWanted = false;
+      this.strayDeg = stray ? Number(stray) : null;
+      this.isWarned &&= this.isLive && this.strayDeg !== null;
+      if (this.isArmed) this.isBack = false;
+      const back = this.isBack ? 'the knob is back; if it has restarted, its zero is where it stood then: press This is zero' : '';
       const silent = !this.isLive && performance.now() - this.openedAt > ANSWER_MS;
       const name = silent && who === 'waiting for an answer' ? 'Nothing answers at this port. Is it a TorqueTuner with the firmware of firmware/?' : who;
       const limits = Number(most) > 0 ? { most: Number(most), stiffness: Number(stiffness), push: Number(push) } : null;
-      this.on({ live: this.isLive, armed: this.isArmed, ceiling: Number(ceiling), angle: Number(angle), torque: Number(torque), feel: Number(feel), limits, who: name, alarm, restriction, refusal, notice });
+      this.on({ live: this.isLive, armed: this.isArmed, wanted: this.isWanted, ceiling: Number(ceiling), angle: Number(angle), torque: Number(torque), feel: Number(feel), limits, who: name, alarm, restriction, refusal, notice: notice || back });
     }
   }
 
   beat() {
     // Nobody obeys a user who does not see the page.
     if (!document.hidden) this.send({ knob: ['beat', 0] });
-    if (this.isArmed && performance.now() - this.heardAt > DEAF_MS) {
-      this.isArmed = false;
+    if (this.mayTurn && performance.now() - this.heardAt > DEAF_MS) {
+      Object.assign(this, { isArmed: false, isWanted: false });
       this.write(this.farewell, true);
       this.on({ live: false, armed: false, who: 'disarmed: the audio thread has stood still', notice: '' });
     }
@@ -124,9 +131,21 @@ export class Knob {
     this.writer.write(bytes).catch(() => {}).finally(() => (this.waiting -= 1));
   }
 
-  /** An act of the user, and nothing else, arms. */
+  /** Torque is there, or may come at any moment. */
+  get mayTurn() {
+    return this.isWanted || Boolean(this.isArmed);
+  }
+
+  /** An act of the user, and nothing else, arms. Returns why not, where the user is to be asked again. */
   arm(event, ceiling) {
-    if (event.isTrusted && this.port && !document.hidden) this.send({ knob: ['arm', ceiling] });
+    if (!event.isTrusted || !this.port || document.hidden) return '';
+    if (this.strayDeg !== null && this.strayDeg !== undefined && !this.isWarned) {
+      this.isWarned = true;
+      return `not armed: the knob stands ${this.strayDeg.toFixed(0)} degrees from its zero, and may turn back there by itself. Let go of it and press This is zero, or press Arm again`;
+    }
+    Object.assign(this, { isWanted: true, isSeen: false, wantedAt: performance.now() });
+    this.send({ knob: ['arm', ceiling] });
+    return '';
   }
 
   lower(ceiling) {
@@ -134,12 +153,14 @@ export class Knob {
   }
 
   zero() {
+    this.isBack = false;
     this.send({ knob: ['zero', 0] });
   }
 
   /** Torque off, now. */
   free(reason) {
     if (!this.port) return;
+    this.isWanted = false;
     // The first of the farewell's two frames; the session says it too, and why.
     this.write(this.farewell?.subarray(0, this.farewell.indexOf(0, 1) + 1), true);
     this.send({ knob: ['free', reason] });
@@ -186,7 +207,7 @@ export class Knob {
   end() {
     clearInterval(this.beating);
     this.send({ knob: ['close', 0] });
-    Object.assign(this, { port: null, writer: null, isLive: false, isArmed: false, farewell: null });
+    Object.assign(this, { port: null, writer: null, isLive: false, isArmed: false, isWanted: false, isWarned: false, isBack: false, strayDeg: null, farewell: null });
   }
 
   /** The user has enough of it. */

@@ -160,7 +160,8 @@ impl HeldKnob {
     }
 
     /// The status as lines for the page: whether it plays, whether it is armed, ceiling, angle, torque and feel, its limits, STATE a
-    /// second, its name or why there is none, then alarm, restriction, refusal and notice, each empty if there is none. Allocates.
+    /// second, its name or why there is none, then alarm, restriction, refusal and notice, each empty if there is none; whether it has
+    /// been told to arm and is not armed yet; and how far it stands from a zero that nobody has set, degrees, or nothing. Allocates.
     pub fn status(&mut self) -> &str {
         let session = &self.session;
         let info = session.info();
@@ -200,6 +201,10 @@ impl HeldKnob {
         let restriction = session.restriction();
         for text in [alarm.as_deref(), restriction.as_deref(), session.refusal(), session.notice()] {
             let _ = write!(self.text, "\n{}", plain(text.unwrap_or_default()));
+        }
+        let _ = write!(self.text, "\n{}\n", u8::from(session.is_arming()));
+        if let Some(stray_deg) = session.stray_deg() {
+            let _ = write!(self.text, "{stray_deg:.1}");
         }
         &self.text
     }

@@ -617,6 +617,14 @@ const TIMED = {
       const button = await page.locator('#knob-stop').boundingBox();
       await lets('Stop', () => page.mouse.click(button.x + 20, button.y + 20), 'stop was pressed');
       await lets('Escape', () => page.keyboard.press('Escape'), 'stop was pressed');
+      // Before the page has heard that the knob is armed: the button with the focus must not be pressed again.
+      await page.waitForFunction(() => !document.getElementById('knob-arm').disabled);
+      await page.click('#knob-arm');
+      await page.waitForTimeout(50);
+      await page.keyboard.press('Space');
+      const spaced = performance.now();
+      await page.waitForTimeout(1500);
+      assert.ok(knob.states.filter(({ at }) => at > spaced + FREE_MS).every(isFree), 'the space bar stops an arming knob');
       const hide = (hidden) => page.evaluate((hidden) => {
         Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });
         document.dispatchEvent(new Event('visibilitychange'));
