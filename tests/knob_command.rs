@@ -155,6 +155,76 @@ fn an_interrupted_program_lets_go_at_once_and_ends() {
     assert!(knob.heard().iter().any(|(_, message)| matches!(message, Message::Bye { .. })));
 }
 
+fn arms(knob: &PtyKnob) -> usize {
+    knob.heard().iter().filter(|(_, message)| matches!(message, Message::Arm(_))).count()
+}
+
+#[test]
+fn a_knob_that_another_program_has_is_not_armed_later() {
+    let (_alone, directory) = (alone(), tempfile::tempdir().unwrap());
+    let knob = PtyKnob::plug(None, &Setup::default());
+    let mut first = chalumeau(&directory, &knob.path, "knob", &[]);
+    let first = Running(first.stderr(Stdio::null()).spawn().unwrap());
+    let is_alive = |message: &(Instant, Message)| matches!(message.1, Message::Alive(_));
+    soon("the first program has it", || knob.heard().iter().any(is_alive));
+    let mut second = chalumeau(&directory, &knob.path, "knob", &["--arm", "60"]);
+    let mut second = Running(second.stdin(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap());
+    soon("the second program ends", || second.0.try_wait().unwrap().is_some());
+    let mut said = String::new();
+    second.0.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(!second.0.wait().unwrap().success());
+    assert!(said.contains("not armed") && said.contains("in use by"), "{said}");
+    drop(first);
+    stays_limp(&knob);
+    assert_eq!(arms(&knob), 0);
+}
+
+/// A knob that answers only after two seconds, and the program that wants to arm it.
+fn late(directory: &TempDir, stdin: Stdio) -> (PtyKnob, Running) {
+    let knob = PtyKnob::plug(None, &Setup::default());
+    knob.faults.stalled.store(true, Ordering::Relaxed);
+    let mut command = chalumeau(directory, &knob.path, "knob", &["--arm", "60"]);
+    let running = Running(command.stdin(stdin).stderr(Stdio::piped()).spawn().unwrap());
+    thread::sleep(Duration::from_secs(3));
+    knob.faults.stalled.store(false, Ordering::Relaxed);
+    (knob, running)
+}
+
+#[test]
+fn a_knob_that_answers_late_is_armed_after_enter_alone() {
+    let (_alone, directory) = (alone(), tempfile::tempdir().unwrap());
+    let (knob, mut running) = late(&directory, Stdio::null());
+    soon("ended", || running.0.try_wait().unwrap().is_some());
+    let mut said = String::new();
+    running.0.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(!running.0.wait().unwrap().success() && said.contains("nobody is at a terminal"), "{said}");
+    assert_eq!(arms(&knob), 0);
+
+    let (mut terminal, slave) = TTYPort::pair().unwrap();
+    let name = slave.name().unwrap();
+    assert!(Command::new("stty").args(["-F", &name, "sane"]).status().unwrap().success());
+    let keys = OpenOptions::new().read(true).write(true).open(&name).unwrap();
+    let (knob, mut running) = late(&directory, Stdio::from(keys));
+    let mut out = running.0.stderr.take().unwrap();
+    let shown = Arc::new(Mutex::new(Vec::new()));
+    let kept = shown.clone();
+    let reading = thread::spawn(move || {
+        let mut bytes = [0; 256];
+        while let Ok(length @ 1..) = out.read(&mut bytes) {
+            kept.lock().unwrap().extend_from_slice(&bytes[..length]);
+        }
+    });
+    soon("asked", || String::from_utf8_lossy(&shown.lock().unwrap()).contains("press Enter"));
+    stays_limp(&knob);
+    assert_eq!(arms(&knob), 0);
+    terminal.write_all(b"\n").unwrap();
+    armed(&knob);
+    running.signal("-INT");
+    limp(&knob);
+    reading.join().unwrap();
+    drop(slave);
+}
+
 #[test]
 fn arming_with_the_usual_feel_works_and_more_than_250_mnm_needs_an_answer() {
     let (_alone, directory) = (alone(), tempfile::tempdir().unwrap());

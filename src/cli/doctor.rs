@@ -65,21 +65,25 @@ impl DoctorCommand {
         let places = RuntimeDir::default();
         list_serial(&mut out, &places)?;
         let midi = list_midi(&mut out)?;
-        let mut live = 0;
-        for candidate in candidates(&places) {
-            live += u32::from(self.ask(&mut out, KnobChoice::Path(candidate.path))?);
+        let serial = candidates(&places).into_iter().map(|candidate| KnobChoice::Path(candidate.path));
+        let midi = midi.into_iter().map(|name| KnobChoice::Midi { name: Some(name) });
+        let mut answers = Vec::new();
+        for choice in serial.chain(midi) {
+            answers.push(self.ask(&mut out, choice)?);
         }
-        for name in midi {
-            live += u32::from(self.ask(&mut out, KnobChoice::Midi { name: Some(name) })?);
+        if answers.contains(&Answer::Live) {
+            return Ok(());
         }
-        if live == 0 {
+        if answers.contains(&Answer::InUse) {
+            tell_who_has_it(&mut out)?;
+        } else {
             tell_what_next(&mut out)?;
         }
         Ok(())
     }
 
-    /// Links to `choice`, watches it and reports; true if a knob with this project's firmware answered.
-    fn ask(&self, out: &mut impl Write, choice: KnobChoice) -> io::Result<bool> {
+    /// Links to `choice`, watches it and reports.
+    fn ask(&self, out: &mut impl Write, choice: KnobChoice) -> io::Result<Answer> {
         let name = match &choice {
             KnobChoice::Path(path) => path.display().to_string(),
             KnobChoice::Midi { name } => name.clone().unwrap_or_default(),
@@ -106,7 +110,8 @@ impl DoctorCommand {
             for line in words.into_iter().flatten().flat_map(|text| text.split(". ")) {
                 writeln!(out, "  {line}")?;
             }
-            return Ok(false);
+            let is_used = matches!(status.phase, Phase::HeldBy(_) | Phase::Busy(_));
+            return Ok(if is_used { Answer::InUse } else { Answer::None });
         }
         thread::sleep(Duration::from_secs_f64(self.seconds));
         let status = link.status();
@@ -119,7 +124,7 @@ impl DoctorCommand {
             )?,
         }
         tell_link(out, &status)?;
-        Ok(status.phase == Phase::Live)
+        Ok(if status.phase == Phase::Live { Answer::Live } else { Answer::None })
     }
 
     fn ask_osc(&self, out: &mut impl Write, port: u16) -> io::Result<()> {
@@ -174,6 +179,27 @@ const SIMULATOR: &str = if cfg!(unix) {
 } else {
     "run chalumeau knob-sim --path PORT at one end of a pair of ports (com0com), then --path"
 };
+
+/// What a port has answered.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Answer {
+    /// A knob with this project's firmware.
+    Live,
+    /// Another program has it.
+    InUse,
+    /// Nothing, or another device.
+    None,
+}
+
+fn tell_who_has_it(out: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        out,
+        "
+A port is in use, so that this program cannot ask what is there. What to do next:
+  Close the program that is named above, and run this again
+  Or, to play with the knob in another instance of the plugin, press Take over knob there"
+    )
+}
 
 fn tell_what_next(out: &mut impl Write) -> io::Result<()> {
     writeln!(

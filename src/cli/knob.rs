@@ -29,6 +29,9 @@ const SHOWN_EVERY: Duration = Duration::from_millis(100);
 const END_BY_FORCE: Duration = Duration::from_millis(300);
 /// How long to look for a knob before giving up.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// The command arms a knob that is there within this time. One that comes later is armed after Enter: the user may have turned to
+/// something else, such as plugging it in.
+const PROMPTLY: Duration = Duration::from_millis(1500);
 
 const EXAMPLES: &str = "\
 Examples:
@@ -46,7 +49,8 @@ Examples:
 
 /// Watch a knob, feel a note on it, record a take
 ///
-/// The knob makes torque only with --arm, and never more than --arm and its own limits allow. Torque ends with the program,
+/// The knob makes torque only with --arm, and never more than --arm and its own limits allow. A knob that is there at once is armed at
+/// once; one that answers later than after 1.5 s is armed after Enter, and one that another program has is not. Torque ends with the program,
 /// however the program ends, and within 630 ms (880 over MIDI) when it stands still, for example after Ctrl-S in its
 /// terminal. Without --arm the knob turns freely and is only read.
 #[derive(Args)]
@@ -214,6 +218,18 @@ impl KnobCommand {
         }
     }
 
+    /// What the command asks of a knob that is there.
+    fn begin(&self, link: &KnobLink) {
+        if self.zero {
+            link.zero();
+        }
+        match self.arm.map(|mnm| mnm.round() as u16) {
+            Some(mnm) if mnm > OFFERED_CEILING_MNM => link.arm_beyond_offer(mnm),
+            Some(mnm) => link.arm(mnm),
+            None => {}
+        }
+    }
+
     fn watch(
         &self,
         link: &KnobLink,
@@ -225,6 +241,7 @@ impl KnobCommand {
         let closing_pa = Settings::default().closing_pa();
         let began = Instant::now();
         let mut live_since = None;
+        let mut enter: Option<Arc<AtomicBool>> = None;
         let mut shown = Instant::now();
         let mut said = String::new();
         // This thread obeys the user: what it prints is what the user sees. When it waits for its terminal, it beats no more.
@@ -252,13 +269,28 @@ impl KnobCommand {
             if live && live_since.is_none() {
                 live_since = Some(Instant::now());
                 note = settle(&status)?;
-                if self.zero {
-                    link.zero();
+                if self.arm.is_some() && began.elapsed() > PROMPTLY {
+                    enter = Some(ask_for_enter()?);
+                } else {
+                    self.begin(link);
                 }
-                match self.arm.map(|mnm| mnm.round() as u16) {
-                    Some(mnm) if mnm > OFFERED_CEILING_MNM => link.arm_beyond_offer(mnm),
-                    Some(mnm) => link.arm(mnm),
-                    None => {}
+            }
+            if enter.take_if(|pressed| pressed.load(Ordering::Relaxed)).is_some() {
+                self.begin(link);
+            }
+            if self.arm.is_some() && live_since.is_none() {
+                match &status.phase {
+                    Phase::HeldBy(holder) => {
+                        return Err(Failure::Usage(format!(
+                            "not armed: the knob is in use by {holder}: end that program, then start this command again"
+                        )));
+                    }
+                    Phase::Busy(text) => {
+                        return Err(Failure::Usage(format!(
+                            "not armed: {text}, then start this command again"
+                        )));
+                    }
+                    _ => {}
                 }
             }
             if live_since.is_none() && began.elapsed() > PATIENCE {
@@ -303,6 +335,28 @@ impl KnobCommand {
         }
         Ok(())
     }
+}
+
+/// Asks for Enter; true once it is pressed. The answer is read elsewhere: this thread goes on obeying the user.
+fn ask_for_enter() -> Result<Arc<AtomicBool>, Failure> {
+    let waited_s = PROMPTLY.as_secs_f64();
+    if !std::io::stdin().is_terminal() {
+        return Err(Failure::Usage(format!(
+            "not armed: the knob answered only after {waited_s} s, and nobody is at a terminal to say that it may be armed now: start \
+             this command again"
+        )));
+    }
+    say!("The knob is here. Let go of it, and press Enter to arm it; Ctrl-C ends");
+    let pressed = Arc::new(AtomicBool::new(false));
+    let told = pressed.clone();
+    std::thread::spawn(move || {
+        let mut answer = String::new();
+        // A terminal that has gone says nothing.
+        if std::io::stdin().lock().read_line(&mut answer).is_ok_and(|length| length > 0) {
+            told.store(true, Ordering::Relaxed);
+        }
+    });
+    Ok(pressed)
 }
 
 fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) -> Result<(), OutputError> {
