@@ -148,6 +148,7 @@ impl Plugin for Chalumeau {
         #[cfg(feature = "devices")]
         {
             self.executor = Some(executor);
+            self.main_pulse.begin_here();
         }
         #[cfg(not(feature = "devices"))]
         drop(executor);

@@ -521,7 +521,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("oscfl", KNOB, "Feel OSC port", whole([0, 65_535], 0, ""))
         .help(
             "UDP port on this machine that the feel is sent to, as OSC",
-            "For other programs that make torque. 0 sends nothing.",
+            "For other programs that make torque, such as the bridge to libmapper. Nothing is sent while Arm knob is off. 0 sends nothing.",
             "",
         )
         .setup()

@@ -1,10 +1,10 @@
 //! The plugin's side of the knob.
 //!
-//! Three threads share it.
+//! Four threads share it.
 //! - The *audio* thread reads angles from a ring, renders the breath, and tells which note is fingered.
 //! - The *link* thread (see [`device`](chalumeau_knob::device)) asks at each cycle for the feel of that note.
-//! - The *knob controller* thread does what may take time: it follows the parameters, computes feels, writes takes, and
-//!   composes the status text.
+//! - The *knob controller* thread carries out the switches and composes the status text. It waits for nothing that takes long.
+//! - The thread of the *slow work* computes feels, and reads and writes takes.
 //!
 //! They exchange data through atomics, triple buffers and rings. The audio thread never waits and frees nothing.
 
@@ -17,11 +17,13 @@ mod knob_audio;
 mod knob_controller;
 mod knob_switches;
 mod main_pulse;
+mod slow_work;
 mod take_recorder;
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, mpsc};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 pub use feel_design::feel_design;
 pub use knob_audio::{BlockContext, KnobAudio};
@@ -35,11 +37,15 @@ use chalumeau_knob::touch::breath_from_angle::BreathMapping;
 use chalumeau_knob::touch::take::Take;
 use chalumeau_knob::wire::message;
 use feel_in_force::FeelInForce;
-use knob_controller::{AudioEnds, KnobController};
+use knob_controller::KnobController;
 use main_pulse::MainPulseAsker;
+use slow_work::{SlowWork, WorkTexts};
 
 /// Number that stands for no note.
 const NO_NOTE: u8 = 255;
+
+/// Time between two cycles of controller and slow work.
+const CYCLE: Duration = Duration::from_millis(10);
 
 /// What the threads share about the knob.
 #[derive(Debug)]
@@ -62,6 +68,8 @@ pub struct SharedKnob {
     main_pulse: Arc<MainPulse>,
     /// The state of the link. Only the controller and the window lock it.
     status: Mutex<Option<LinkStatus>>,
+    /// What the slow work tells the user. Only it and the controller lock it.
+    work_texts: Mutex<WorkTexts>,
     /// A take is recorded, so the audio thread sends its sound.
     is_recording: AtomicBool,
     /// The host has activated this instance. An instance that was never active leaves the knob to the others.
@@ -82,6 +90,7 @@ impl SharedKnob {
             audio_heart: OnceLock::new(),
             main_pulse,
             status: Mutex::default(),
+            work_texts: Mutex::default(),
             is_recording: AtomicBool::new(false),
             is_active: AtomicBool::new(false),
             stop: AtomicBool::new(false),
@@ -116,6 +125,19 @@ impl SharedKnob {
         self.status.lock().ok()?.clone()
     }
 
+    /// The slow work tells the user something.
+    fn tell(&self, texts: &WorkTexts) {
+        if let Ok(mut told) = self.work_texts.lock()
+            && *told != *texts
+        {
+            told.clone_from(texts);
+        }
+    }
+
+    fn work_texts(&self) -> WorkTexts {
+        self.work_texts.lock().map(|texts| texts.clone()).unwrap_or_default()
+    }
+
     fn breath(&self) -> f32 {
         f32::from_bits(self.breath.load(Ordering::Relaxed))
     }
@@ -132,11 +154,11 @@ impl SharedKnob {
 /// The knob of one plugin instance. Dropping it ends the controller and the link.
 pub struct PluginKnob {
     shared: Arc<SharedKnob>,
-    controller: Option<JoinHandle<()>>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 impl PluginKnob {
-    /// Starts the controller, which starts the link when the user wants a knob. `ask_main` makes the host's main thread
+    /// Starts the controller, which starts the link when the user wants a knob, and the slow work. `ask_main` makes the host's main thread
     /// answer to `main_pulse`. Allocates.
     pub fn start(
         params: Arc<ChalumeauParams>,
@@ -150,13 +172,19 @@ impl PluginKnob {
         let (readers_in, readers) = rtrb::RingBuffer::new(1);
         let asker = MainPulseAsker::new(ask_main);
         let (sound, listener) = heard_sound::sound_channel(shared.clone());
-        let ends = AudioEnds { readers: readers_in, hand: hand_in, take: take_in, sound: listener };
-        let controller = KnobController::new(params, shared.clone(), instrument, asker, ends);
+        let (rows_in, rows) = mpsc::channel();
+        let (of_work, of_controller) = (params.clone(), params);
+        let work =
+            SlowWork::new(of_work, shared.clone(), instrument.clone(), hand_in, take_in, listener, rows);
         let controller =
-            std::thread::Builder::new().name("KnobController".to_owned()).spawn(move || controller.run());
+            KnobController::new(of_controller, shared.clone(), instrument, asker, readers_in, rows_in);
+        let threads = [
+            std::thread::Builder::new().name("KnobController".to_owned()).spawn(move || controller.run()),
+            std::thread::Builder::new().name("KnobWork".to_owned()).spawn(move || work.run()),
+        ];
         let audio = KnobAudio::new(shared.clone(), readers, hand, take, sound);
         // Without a thread there is no knob, but the instrument plays.
-        (Self { shared, controller: controller.ok() }, audio)
+        (Self { shared, threads: threads.into_iter().flatten().collect() }, audio)
     }
 
     /// What the window reads and sets.
@@ -170,9 +198,9 @@ impl Drop for PluginKnob {
         self.shared.stop.store(true, Ordering::Relaxed);
         // The controller asks the host's main thread through the plugin's frame, and may be the last to hold it.
         let is_other = |thread: &JoinHandle<()>| thread.thread().id() != std::thread::current().id();
-        if let Some(controller) = self.controller.take().filter(is_other) {
+        for thread in self.threads.drain(..).filter(is_other) {
             // The panic of a thread was reported when it happened.
-            let _ = controller.join();
+            let _ = thread.join();
         }
     }
 }

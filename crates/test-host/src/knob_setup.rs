@@ -3,8 +3,9 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use clack_host::utils::ClapId;
 
-use crate::clap::{Plugin, Session};
+use crate::clap::{At, Plugin, Say, Session};
 
 /// How long to wait for the knob, s.
 const PATIENCE_S: u64 = 20;
@@ -59,5 +60,14 @@ pub fn wait_until_live(session: &mut Session, rate_hz: f64) -> Result<()> {
         session.play_live(&[], (0.1 * rate_hz) as usize, rate_hz)?;
     }
     session.play_live(&[], rate_hz as usize, rate_hz)?;
+    Ok(())
+}
+
+/// Presses *Arm knob*, by its id, where the knob stands away from a zero that nobody has set: the first press is answered with a
+/// warning. Afterwards the switch is off, and the next press arms.
+pub fn hear_of_zero(session: &mut Session, arm: ClapId, rate_hz: f64) -> Result<()> {
+    for (value, seconds) in [(1.0, 0.5), (0.0, 1.0)] {
+        session.play_live(&[At(0, Say::Set(arm, value))], (seconds * rate_hz) as usize, rate_hz)?;
+    }
     Ok(())
 }

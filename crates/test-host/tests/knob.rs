@@ -19,7 +19,7 @@ use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMappin
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use chalumeau_test_host::clap::{At, Say};
-use chalumeau_test_host::knob_setup::{connect, edit, wait_until_live};
+use chalumeau_test_host::knob_setup::{connect, edit, hear_of_zero, wait_until_live};
 use chalumeau_test_host::simulator::{Simulator, serial_number};
 use live::{BLOCK, E3, RATE, SECOND, breath, level_db, on, play_until, plugin};
 
@@ -239,6 +239,7 @@ fn knob_that_is_armed() -> Vec<[f64; 3]> {
             wait_until_live(session, RATE).unwrap();
             session.play_live(&[At(0, on(E3))], SECOND, RATE).unwrap();
             session.play_live(&[At(0, Say::Set(arm, 0.0))], SECOND, RATE).unwrap();
+            hear_of_zero(session, arm, RATE).unwrap();
             session.play_live(&[At(0, Say::Set(arm, 1.0))], 2 * SECOND, RATE).unwrap();
             session.play_live(&[At(0, Say::Set(arm, 0.0))], SECOND / 2, RATE).unwrap();
         })

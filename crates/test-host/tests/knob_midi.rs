@@ -16,7 +16,7 @@ use chalumeau_core::analysis::to_f64;
 use chalumeau_core::units::cents;
 use chalumeau_test_host::artefacts;
 use chalumeau_test_host::clap::{At, Plugin, Say};
-use chalumeau_test_host::knob_setup::{connect_midi, wait_until_live};
+use chalumeau_test_host::knob_setup::{connect_midi, hear_of_zero, wait_until_live};
 use chalumeau_test_host::simulator::{Simulator, serial_number};
 use live::{BLOCK, E3, RATE, SECOND, breath, level_db, on, play_until, plugin};
 use tempfile::TempDir;
@@ -169,6 +169,7 @@ fn feel_reaches_a_midi_knob_and_torque_waits_for_the_user() {
             assert!(idle.iter().all(|row| !row.armed && row.torque_mnm == 0.0), "torque nobody asked for");
             let lowest = idle.last().unwrap().feel_id;
 
+            hear_of_zero(session, arm, RATE).unwrap();
             session.play_live(&[At(0, Say::Set(arm, 1.0))], SECOND / 10, RATE).unwrap();
             let took = play_until(session, "torque", |_| knob.last(|row| row.armed && row.torque_mnm < -5.0));
             println!("felt {:.2} s after Arm as the log has it", took.as_secs_f64());
@@ -245,6 +246,7 @@ fn an_unplugged_midi_knob_is_found_again_disarmed() {
     let mut session = plugin.activate(RATE, BLOCK).unwrap();
     wait_until_live(&mut session, RATE).unwrap();
     play_until(&mut session, "the hand", |_| knob.last(Row::is_held));
+    hear_of_zero(&mut session, arm, RATE).unwrap();
     session.play_live(&[At(0, on(E3)), At(0, Say::Set(arm, 1.0))], SECOND, RATE).unwrap();
     play_until(&mut session, "torque", |_| knob.last(|row| row.armed));
 

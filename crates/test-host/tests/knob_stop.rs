@@ -125,6 +125,10 @@ fn late(round: usize) -> Vec<String> {
     connect(&mut plugin, number).unwrap();
     let mut session = plugin.activate(RATE, BLOCK).unwrap();
     wait_until_live(&mut session, RATE).unwrap();
+    let arm = plugin.param("Arm knob").unwrap().id;
+    // The hand holds it away from a zero that nobody has set, which the first press tells.
+    attended(&mut plugin, &mut session, &[At(0, Say::Set(arm, 1.0))], 0.5);
+    attended(&mut plugin, &mut session, &[At(0, Say::Set(arm, 0.0))], 0.8);
     let mut held_s = Vec::new();
     for stop in STOPS {
         let (next, held) = course(&mut plugin, session, stop);

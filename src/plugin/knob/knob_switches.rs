@@ -27,6 +27,8 @@ pub struct KnobSwitches {
     /// When the knob was told to arm.
     asked: Option<Instant>,
     was_armed: bool,
+    /// The user has been told that the knob stands away from a zero that nobody has set.
+    is_warned: bool,
     /// What the user must do next.
     hint: Option<String>,
 }
@@ -72,7 +74,12 @@ impl KnobSwitches {
             feel_port: u16::try_from(knob.feel_port.value()).unwrap_or(0),
         };
         let before = std::mem::replace(&mut self.before, now);
-        self.apply_arm(moments.take(Moment::Arm), now, before, status, link);
+        let is_pressed = moments.take(Moment::Arm);
+        // Whatever the knob does: one that is arming must not make more either.
+        if now.ceiling_mnm < before.ceiling_mnm {
+            link.lower_ceiling(now.ceiling_mnm);
+        }
+        self.apply_arm(is_pressed, now, before, status, link, calibrator);
         moments.set_possible(Moment::Arm, self.may_arm(status));
         if now.feel_port != before.feel_port {
             let port = now.feel_port;
@@ -86,7 +93,7 @@ impl KnobSwitches {
             link.take_over();
         }
         if moments.take(Moment::Rest) {
-            if status.armed {
+            if status.armed || status.arming || self.asked.is_some() {
                 self.set_hint("Rest here: switch Arm off first".to_owned());
             } else {
                 calibrator.rest();
@@ -114,7 +121,10 @@ impl KnobSwitches {
         before: Positions,
         status: &LinkStatus,
         link: &KnobLink,
+        calibrator: &Calibrator,
     ) {
+        // A connection that is new, and a zero that was set, are asked about anew.
+        self.is_warned &= is_live(status) && status.stray_deg.is_some();
         if status.armed || !is_live(status) {
             self.asked = None;
         } else if self.asked.is_some_and(|asked| asked.elapsed() > ARM_WITHIN) {
@@ -130,9 +140,20 @@ impl KnobSwitches {
             // Off and on again since the last look.
             link.disarm();
         } else if is_pressed && now.arm && self.is_due() {
-            link.arm(now.ceiling_mnm);
-            (self.asked, self.off_since) = (Some(Instant::now()), None);
-            self.hint = None;
+            self.off_since = None;
+            if calibrator.is_busy() {
+                self.set_hint("not armed: wait until the knob is calibrated, then switch Arm on".to_owned());
+            } else if let Some(stray_deg) = status.stray_deg.filter(|_| !self.is_warned) {
+                self.is_warned = true;
+                self.set_hint(format!(
+                    "not armed: the knob stands {stray_deg:.0} degrees from its zero, and may turn back there by itself. Let \
+                     go of it and press Rest here, or switch Arm on again"
+                ));
+            } else {
+                link.arm(now.ceiling_mnm);
+                self.asked = Some(Instant::now());
+                self.hint = None;
+            }
         } else if is_pressed {
             self.set_hint("not armed: wait for the knob, then switch Arm on".to_owned());
         } else if !now.arm && before.arm {
@@ -140,8 +161,6 @@ impl KnobSwitches {
             if status.armed {
                 self.hint = None;
             }
-        } else if status.armed && now.ceiling_mnm < before.ceiling_mnm {
-            link.lower_ceiling(now.ceiling_mnm);
         } else if status.armed && now.ceiling_mnm > before.ceiling_mnm {
             self.set_hint("to allow more torque, switch Arm off and on again".to_owned());
         }
@@ -151,4 +170,155 @@ impl KnobSwitches {
 /// Whether a knob sends angles.
 pub fn is_live(status: &LinkStatus) -> bool {
     matches!(status.phase, Phase::Live | Phase::ReadOnly)
+}
+
+#[cfg(all(test, feature = "simulator"))]
+mod tests {
+    use super::*;
+    use crate::plugin::params::ChalumeauParams;
+    use chalumeau_firmware::{Firmware, Reading, Setup};
+    use chalumeau_knob::device::Hooks;
+    use chalumeau_knob::device::memory::{MemoryPort, pair};
+    use chalumeau_knob::device::transport::{Binding, Transport};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+    use std::thread;
+
+    /// The firmware at the other end of a link, in real time, and a shaft that nothing but the test turns.
+    struct Desk {
+        params: ChalumeauParams,
+        link: KnobLink,
+        switches: KnobSwitches,
+        calibrator: Calibrator,
+        counts: Arc<AtomicI64>,
+        stop: Arc<AtomicBool>,
+        knob: Option<thread::JoinHandle<()>>,
+    }
+
+    fn live(mut port: MemoryPort, setup: &Setup, counts: &AtomicI64, stop: &AtomicBool) {
+        let (mut firmware, born, mut ticks, mut at) = (Firmware::new(setup), Instant::now(), 0, 0);
+        while !stop.load(Ordering::Relaxed) {
+            let _ = port.poll(Duration::from_millis(1), &mut |bytes| firmware.receive(bytes));
+            while 500 * ticks <= born.elapsed().as_micros() as u64 {
+                at += (counts.load(Ordering::Relaxed) - at).clamp(-10, 10);
+                let reading = Reading { counts: at, tells_velocity: false, ..Reading::default() };
+                firmware.tick(500 * ticks, &reading);
+                ticks += 1;
+            }
+            let mut bytes = [0; 1024];
+            let length = firmware.transmit(&mut bytes);
+            let _ = port.send(&bytes[..length]);
+        }
+    }
+
+    impl Desk {
+        fn new() -> Self {
+            let (link, _reader) = KnobLink::spawn("test", Hooks::default());
+            let (ours, theirs) = pair(Binding::Serial, "a wire");
+            let (counts, stop) = (Arc::new(AtomicI64::new(0)), Arc::new(AtomicBool::new(false)));
+            let (turned, stopped) = (counts.clone(), stop.clone());
+            let setup = Setup::default();
+            let knob = thread::spawn(move || live(theirs, &setup, &turned, &stopped));
+            link.attach(Box::new(ours));
+            let mut desk = Self {
+                params: ChalumeauParams::default(),
+                link,
+                switches: KnobSwitches::default(),
+                calibrator: Calibrator::new(),
+                counts,
+                stop,
+                knob: Some(knob),
+            };
+            desk.until("live", |desk| desk.link.status().phase == Phase::Live);
+            desk.until("due", |desk| desk.switches.is_due());
+            desk
+        }
+
+        /// One cycle of the controller.
+        fn cycle(&mut self) {
+            let status = self.link.status();
+            let Self { params, link, switches, calibrator, .. } = self;
+            switches.apply(&params.moments, &params.knob, &status, link, calibrator);
+            params.fall_back();
+        }
+
+        #[track_caller]
+        fn until(&mut self, what: &str, holds: impl Fn(&mut Self) -> bool) {
+            let begun = Instant::now();
+            while !holds(self) {
+                assert!(begun.elapsed() < Duration::from_secs(20), "{what}: {:?}", self.link.status());
+                self.cycle();
+                thread::sleep(Duration::from_millis(2));
+            }
+        }
+
+        #[allow(unsafe_code)]
+        fn set(&self, param: &impl nice_plug::params::InternalParamMut<Plain = f32>, value: f32) {
+            // SAFETY: the setter stores atomics and calls a callback of this crate.
+            unsafe { param._internal_set_plain_value(value) };
+        }
+
+        #[allow(unsafe_code)]
+        fn press_arm(&self) {
+            // SAFETY: as above.
+            unsafe {
+                nice_plug::params::InternalParamMut::_internal_set_plain_value(&self.params.knob.arm, true)
+            };
+        }
+
+        fn hint(&self) -> String {
+            self.switches.hint().cloned().unwrap_or_default()
+        }
+    }
+
+    impl Drop for Desk {
+        fn drop(&mut self) {
+            self.stop.store(true, Ordering::Relaxed);
+            if let Some(knob) = self.knob.take() {
+                let _ = knob.join();
+            }
+        }
+    }
+
+    #[test]
+    fn a_ceiling_that_is_lowered_while_the_knob_is_arming_holds() {
+        let mut desk = Desk::new();
+        let heart = desk.link.heartbeat("the test");
+        desk.set(&desk.params.knob.ceiling, 100.0);
+        desk.cycle();
+        desk.press_arm();
+        desk.cycle();
+        desk.set(&desk.params.knob.ceiling, 60.0);
+        assert!(!desk.link.status().armed, "it is not armed yet");
+        desk.cycle();
+        heart.beat();
+        desk.until("the lower ceiling", |desk| desk.link.status().ceiling_mnm == 60);
+    }
+
+    #[test]
+    fn arming_away_from_an_unknown_zero_is_asked_about_once_and_refused_during_a_calibration() {
+        let mut desk = Desk::new();
+        desk.counts.store(900, Ordering::Relaxed);
+        desk.until("stray", |desk| desk.link.status().stray_deg.is_some_and(|deg| deg > 80.0));
+        desk.press_arm();
+        desk.cycle();
+        assert!(desk.hint().contains("degrees from its zero"), "{}", desk.hint());
+        assert!(!desk.link.status().arming);
+        desk.calibrator.rest();
+        desk.until("due", |desk| desk.switches.is_due());
+        desk.press_arm();
+        desk.cycle();
+        assert!(desk.hint().contains("calibrated"), "{}", desk.hint());
+        desk.calibrator = Calibrator::new();
+        desk.until("due", |desk| desk.switches.is_due());
+        let heart = desk.link.heartbeat("the test");
+        desk.press_arm();
+        desk.cycle();
+        desk.until("asked", |desk| {
+            heart.beat();
+            let status = desk.link.status();
+            status.arming || status.armed || status.last_refusal.is_some()
+        });
+        assert_eq!(desk.hint(), "");
+    }
 }

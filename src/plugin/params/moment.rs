@@ -8,8 +8,14 @@
 //! A press is an atomic flag, set where the host moves the switch and taken where it is carried out.
 
 use std::sync::Arc;
+#[cfg(feature = "devices")]
+use std::sync::OnceLock;
+#[cfg(feature = "devices")]
+use std::sync::atomic::AtomicBool;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+#[cfg(feature = "devices")]
+use chalumeau_knob::device::{Heartbeat, Release};
 use nice_plug::params::InternalParamMut;
 use nice_plug::prelude::*;
 
@@ -66,12 +72,39 @@ pub struct Moments {
     possible: AtomicU32,
     /// Off again since the host was last told.
     fallen: AtomicU32,
+    /// *Arm knob* was on when it was last moved.
+    #[cfg(feature = "devices")]
+    is_arm_on: AtomicBool,
+    /// Takes the torque away, once there is a link to a knob.
+    #[cfg(feature = "devices")]
+    arm_heart: OnceLock<Heartbeat>,
 }
 
 impl Moments {
     /// The control was switched on.
     pub fn press(&self, control: Moment) {
         self.pressed.fetch_or(control.bit(), Ordering::AcqRel);
+    }
+
+    /// Who takes the torque away when *Arm knob* is switched off.
+    #[cfg(feature = "devices")]
+    pub fn set_arm_heart(&self, heart: Heartbeat) {
+        let _ = self.arm_heart.set(heart);
+    }
+
+    /// The control was moved. *Arm knob* lets go at once when it goes off, and waits for no other thread.
+    fn moved(&self, control: Moment, is_on: bool) {
+        if is_on {
+            self.press(control);
+        }
+        #[cfg(feature = "devices")]
+        if control == Moment::Arm
+            && self.is_arm_on.swap(is_on, Ordering::AcqRel)
+            && !is_on
+            && let Some(heart) = self.arm_heart.get()
+        {
+            heart.let_go(Release::SwitchedOff);
+        }
     }
 
     /// Whether the control was switched on since this was last asked. Whoever asks carries it out.
@@ -98,11 +131,7 @@ impl Moments {
 /// A switch of the table that is a control of the moment.
 pub(super) fn switch(control: Moment, moments: &Arc<Moments>) -> BoolParam {
     let moments = moments.clone();
-    super::entry::switch(control.id()).with_callback(Arc::new(move |on| {
-        if on {
-            moments.press(control);
-        }
-    }))
+    super::entry::switch(control.id()).with_callback(Arc::new(move |on| moments.moved(control, on)))
 }
 
 impl ChalumeauParams {
@@ -182,6 +211,34 @@ mod tests {
         params.fall_back();
         assert!(!is_on(&params, Moment::Arm));
         assert!(params.moments.take_fallen().eq([Moment::Arm, Moment::Record]));
+    }
+
+    #[cfg(feature = "devices")]
+    #[test]
+    fn arm_lets_go_at_the_moment_it_goes_off_and_only_then() {
+        use chalumeau_knob::device::Heartbeats;
+        use chalumeau_knob::device::heartbeat::Monitor;
+
+        let params = ChalumeauParams::default();
+        params.moments.set_possible(Moment::Arm, true);
+        set_on(&params, Moment::Arm);
+        set_off(params.control(Moment::Arm));
+        let heartbeats = Heartbeats::default();
+        let mut monitor = Monitor::new(heartbeats.clone());
+        params.moments.set_arm_heart(heartbeats.register("the test"));
+        let mut released = || monitor.look(0).released;
+        assert_eq!(released(), None);
+        for _ in 0..2 {
+            set_off(params.control(Moment::Arm));
+            assert_eq!(released(), None, "it was off");
+            set_on(&params, Moment::Arm);
+            assert_eq!(released(), None);
+            set_off(params.control(Moment::Arm));
+            assert_eq!(released(), Some(Release::SwitchedOff));
+        }
+        set_on(&params, Moment::Rest);
+        params.fall_back();
+        assert_eq!(released(), None, "another control");
     }
 
     #[test]

@@ -25,11 +25,19 @@ pub enum Release {
     Stop,
     /// The user interrupts the program.
     Interrupted,
+    /// The user switches off what armed it.
+    SwitchedOff,
 }
 
 impl Release {
-    const ALL: [Self; 5] =
-        [Self::Panic, Self::Deactivated, Self::TransportStopped, Self::Stop, Self::Interrupted];
+    const ALL: [Self; 6] = [
+        Self::Panic,
+        Self::Deactivated,
+        Self::TransportStopped,
+        Self::Stop,
+        Self::Interrupted,
+        Self::SwitchedOff,
+    ];
 
     /// The reason for people, as it follows "disarmed: ".
     pub fn text(self) -> &'static str {
@@ -39,6 +47,7 @@ impl Release {
             Self::TransportStopped => "the host has stopped",
             Self::Stop => "stop was pressed",
             Self::Interrupted => "the program was interrupted",
+            Self::SwitchedOff => "Arm was switched off",
         }
     }
 }

@@ -1,0 +1,251 @@
+//! The knob's slow work: feels, takes and their files.
+//!
+//! It has a thread of its own, so that the thread that carries out the user's switches waits for none of it. What it has to say
+//! to the user goes out as texts.
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, mpsc};
+
+use super::SharedKnob;
+use super::feel_design::{feel_design, knob_design};
+use super::feel_in_force::FeelInForce;
+use super::feels_cache::FeelsCache;
+use super::heard_sound::SoundListener;
+use super::take_recorder::{TakeRecorder, load_take, marks};
+use crate::plugin::instrument_loading::SharedInstrument;
+use crate::plugin::params::ChalumeauParams;
+use crate::plugin::params::knob::KnobKind;
+use crate::plugin::params::moment::Moment;
+use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_core::haptics::{FeelDesign, TorqueLimits};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::units::WrittenNote;
+use chalumeau_knob::device::LinkStatus;
+use chalumeau_knob::touch::breath_from_angle::BreathMapping;
+use chalumeau_knob::touch::feel::InstrumentFeel;
+use chalumeau_knob::touch::take::{Take, TakeRow};
+
+/// What the slow work tells the user.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WorkTexts {
+    /// Rows of the take that is being recorded.
+    pub rows: Option<u64>,
+    /// Why the latest feel was refused.
+    pub refused: Option<String>,
+    /// A warning that full breath does not reach the closing pressure.
+    pub short_breath: Option<String>,
+    /// The latest message about a take.
+    pub take: Option<String>,
+}
+
+/// The state of the thread.
+pub struct SlowWork {
+    params: Arc<ChalumeauParams>,
+    shared: Arc<SharedKnob>,
+    instrument: Arc<SharedInstrument>,
+    feels_cache: FeelsCache,
+    hand_in: triple_buffer::Input<BreathMapping>,
+    hand: BreathMapping,
+    take: triple_buffer::Input<Option<Arc<Take>>>,
+    /// What the feel in force was computed from.
+    feel_inputs: Option<(Arc<InstrumentFeel>, Settings, FeelDesign, TorqueLimits)>,
+    /// Rows that the link's thread sends.
+    rows: mpsc::Receiver<TakeRow>,
+    recorder: TakeRecorder,
+    /// The take that is replayed; empty for none.
+    replay_path: String,
+    texts: WorkTexts,
+}
+
+impl SlowWork {
+    pub fn new(
+        params: Arc<ChalumeauParams>,
+        shared: Arc<SharedKnob>,
+        instrument: Arc<SharedInstrument>,
+        hand_in: triple_buffer::Input<BreathMapping>,
+        take: triple_buffer::Input<Option<Arc<Take>>>,
+        sound: SoundListener,
+        rows: mpsc::Receiver<TakeRow>,
+    ) -> Self {
+        Self {
+            params,
+            shared,
+            instrument,
+            feels_cache: FeelsCache::default(),
+            hand_in,
+            hand: BreathMapping::default(),
+            take,
+            feel_inputs: None,
+            rows,
+            recorder: TakeRecorder::new(sound),
+            replay_path: String::new(),
+            texts: WorkTexts::default(),
+        }
+    }
+
+    /// Until the plugin's knob stops; then the take that is open is completed.
+    pub fn run(mut self) {
+        while !self.shared.stop.load(Ordering::Relaxed) {
+            if self.shared.is_active.load(Ordering::Relaxed) {
+                self.cycle();
+            }
+            std::thread::sleep(super::CYCLE);
+        }
+        self.record(false);
+    }
+
+    fn cycle(&mut self) {
+        let params = self.params.clone();
+        let knob = &params.knob;
+        let has_knob = knob.kind.value() != KnobKind::Off;
+        let status = self.shared.status();
+        if has_knob || knob.replay.value() {
+            self.update_feel(&params, status.as_ref());
+        }
+        self.update_replay();
+        self.update_hand(status.as_ref());
+        self.record(knob.record.value() && has_knob);
+        self.texts.rows = self.recorder.rows();
+        self.shared.tell(&self.texts);
+    }
+
+    /// Computes the feel again if one of its inputs has changed.
+    fn update_feel(&mut self, params: &ChalumeauParams, status: Option<&LinkStatus>) {
+        let settings = params.settings().with_reed_factors(self.shared.reed_factors());
+        let design = feel_design(&params.knob);
+        let ceiling_mnm = params.knob.ceiling.value().round() as u16;
+        let limits = match status.and_then(|status| status.info.as_ref()) {
+            Some(info) => info.torque_limits(ceiling_mnm),
+            None => TorqueLimits { ceiling_mnm: f64::from(ceiling_mnm), ..TorqueLimits::default() },
+        };
+        let Some(feels) = self.feels_cache.of(&self.instrument) else { return };
+        let same = self.feel_inputs.as_ref().is_some_and(|(of, by, with, under)| {
+            Arc::ptr_eq(of, &feels) && (*by, *with, *under) == (settings, design, limits)
+        });
+        if same {
+            return;
+        }
+        self.feel_inputs = Some((feels.clone(), settings, design, limits));
+        self.texts.short_breath = short_breath(&settings);
+        match feels.table(&settings, &design, &limits) {
+            Ok(table) => {
+                let in_force = FeelInForce::new(feels, table, &settings);
+                self.hand.maps = in_force.maps();
+                self.hand_in.write(self.hand);
+                if let Ok(mut feel) = self.shared.feel.lock() {
+                    *feel = Some(Arc::new(in_force));
+                }
+                self.texts.refused = None;
+            }
+            // The old feel stays, and its angles keep their breath.
+            Err(reason) => self.texts.refused = Some(format!("feel unchanged: {reason}")),
+        }
+    }
+
+    fn update_hand(&mut self, status: Option<&LinkStatus>) {
+        let feels = status.is_none_or(|status| status.tier > 0);
+        let design = knob_design(&self.params.knob);
+        // A knob that feels counts from its own zero. The rest of another, which counts from where it was switched on, is none of
+        // its own.
+        let is_felt = status.is_some_and(|status| status.tier > 0);
+        let design = if is_felt { from_zero(design) } else { design };
+        if (self.hand.design, self.hand.feels) != (design, feels) {
+            (self.hand.design, self.hand.feels) = (design, feels);
+            self.hand_in.write(self.hand);
+        }
+    }
+
+    /// Loads the take to replay, if that has changed.
+    fn update_replay(&mut self) {
+        let knob = &self.params.knob;
+        let path = match knob.take.read() {
+            Ok(path) if knob.replay.value() => path.clone(),
+            _ => String::new(),
+        };
+        if path == self.replay_path {
+            return;
+        }
+        self.replay_path.clone_from(&path);
+        self.texts.take = None;
+        let take = (!path.is_empty()).then(|| load_take(&path)).transpose();
+        match take {
+            Ok(take) => self.take.write(take),
+            Err(reason) => {
+                self.texts.take = Some(reason);
+                self.take.write(None);
+            }
+        }
+    }
+
+    /// Records the rows that have come while `wanted`; otherwise completes the take. *Record take* stays on only while it can
+    /// record.
+    fn record(&mut self, wanted: bool) {
+        let rows: Vec<TakeRow> = self.rows.try_iter().collect();
+        let (moments, has_knob) = (&self.params.moments, self.params.knob.kind.value() != KnobKind::Off);
+        if moments.take(Moment::Record) && !has_knob {
+            self.texts.take = Some("nothing to record: choose a knob first".to_owned());
+        }
+        moments.set_possible(Moment::Record, has_knob);
+        if wanted && let Err(reason) = self.recorder.begin(&self.params) {
+            self.params.moments.set_possible(Moment::Record, false);
+            self.texts.take = Some(reason);
+            return;
+        }
+        let settings = self.params.settings().with_reed_factors(self.shared.reed_factors());
+        let mut marks = marks(&self.params, &settings);
+        if self.texts.refused.is_some() {
+            // The feel did not follow the sound, so these rows do not belong to a study.
+            marks.study = None;
+        }
+        self.shared.is_recording.store(wanted, Ordering::Relaxed);
+        for moment in &rows {
+            marks.sounds_from = moment.written.and_then(|written| self.sounds_from(WrittenNote(written)));
+            self.recorder.take_in(moment, &marks);
+        }
+        self.recorder.write_known();
+        if !wanted && let Some(text) = self.recorder.end(&self.params) {
+            self.texts.take = Some(text);
+        }
+    }
+
+    /// Gamma at which a note begins to sound with the feel in force.
+    fn sounds_from(&self, written: WrittenNote) -> Option<f64> {
+        self.shared.feel_in_force()?.sounds_from(written)
+    }
+}
+
+/// The same way to full breath, from zero.
+fn from_zero(design: KnobDesign) -> KnobDesign {
+    KnobDesign { zero_deg: 0.0, full_deg: design.full_deg - design.zero_deg, ..design }
+}
+
+/// A warning if full breath does not reach the closing pressure.
+fn short_breath(settings: &Settings) -> Option<String> {
+    let (full_kpa, closing_kpa) = (f64::from(settings.breath_full_kpa), 1e-3 * settings.closing_pa());
+    // Full breath is in single precision, which makes 6 kPa a little less than 6 kPa.
+    (full_kpa < 0.999 * closing_kpa).then(|| {
+        format!("this reed closes at {closing_kpa:.1} kPa: raise Full breath ({full_kpa:.1} kPa) to reach it")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau_knob::touch::breath_from_angle::Blower;
+
+    #[test]
+    fn the_rest_of_another_knob_takes_nothing_from_one_that_feels() {
+        let design = KnobDesign { zero_deg: 40.0, full_deg: 400.0, ..KnobDesign::default() };
+        let feels = InstrumentFeel::built_in().unwrap();
+        let table = feels
+            .table(&Settings::default(), &FeelDesign::default(), &chalumeau_knob::touch::feel::NO_MOTOR)
+            .unwrap();
+        let breath = |design| {
+            let hand = BreathMapping { maps: feels.maps(&table), design, feels: true };
+            Blower::default().blow(&hand, 200.0, 6_000.0).unwrap()
+        };
+        let own = KnobDesign { zero_deg: 0.0, full_deg: 360.0, ..KnobDesign::default() };
+        assert_eq!(breath(from_zero(design)), breath(own));
+        assert_ne!(breath(design), breath(own));
+    }
+}
