@@ -14,6 +14,9 @@ use crate::wire::Feel;
 const WARNING: &str = "the torque goes through the bridge: if this program ends, the bridge takes it away after 3 s; if the \
                        bridge ends or the network fails, the knob keeps it: have the motor's switch within reach";
 
+/// Why a knob that only sends its position is not armed without a bridge.
+const NO_BRIDGE: &str = "this knob's firmware can only be read. Only a bridge to libmapper gives it a feel: Feel OSC port, docs/touch.md";
+
 /// See the module.
 #[derive(Default)]
 pub struct BridgedFeel {
@@ -28,11 +31,6 @@ impl BridgedFeel {
     pub fn send_to(&mut self, sender: Option<FeelSender>) {
         self.disarm();
         self.sender = sender;
-    }
-
-    /// Whether there is a bridge to send to.
-    pub fn is_there(&self) -> bool {
-        self.sender.is_some()
     }
 
     /// Most torque allowed, mNm; `None` while disarmed.
@@ -50,8 +48,8 @@ impl BridgedFeel {
         self.ceiling_mnm.map(|_| WARNING)
     }
 
-    /// The user allows torque: only ever call it for an act of the user. An error, with the reason, where nobody obeys or the
-    /// knob is silent.
+    /// The user allows torque: only ever call it for an act of the user. An error, with the reason, where there is no bridge, nobody
+    /// obeys or the knob is silent.
     pub fn arm(
         &mut self,
         ceiling_mnm: u16,
@@ -60,7 +58,8 @@ impl BridgedFeel {
         is_heard: bool,
         now_us: i64,
     ) -> Result<(), String> {
-        if let Some(why) = reason(pulse, is_heard, now_us) {
+        let no_bridge = self.sender.is_none().then(|| NO_BRIDGE.to_owned());
+        if let Some(why) = no_bridge.or_else(|| reason(pulse, is_heard, now_us)) {
             return Err(format!("not armed: {why}"));
         }
         let most_mnm = if further_act { HARD_CEILING_MNM } else { OFFERED_CEILING_MNM };

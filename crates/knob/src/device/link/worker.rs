@@ -228,11 +228,6 @@ impl Worker {
         if self.connection.is_none() {
             return Err("not armed: no knob is connected".into());
         }
-        if !self.bridged.is_there() {
-            return Err("not armed: this knob's firmware can only be read. Only a bridge to libmapper gives it a feel: \
-                        Feel OSC port, docs/touch.md"
-                .into());
-        }
         let (pulse, is_heard) = (self.monitor.look(now_us), self.is_stock_heard(now_us));
         self.bridged.arm(ceiling_mnm, further_act, &pulse, is_heard, now_us)
     }
