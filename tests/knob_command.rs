@@ -179,49 +179,64 @@ fn a_knob_that_another_program_has_is_not_armed_later() {
     assert_eq!(arms(&knob), 0);
 }
 
-/// A knob that answers only after two seconds, and the program that wants to arm it.
-fn late(directory: &TempDir, stdin: Stdio) -> (PtyKnob, Running) {
-    let knob = PtyKnob::plug(None, &Setup::default());
-    knob.faults.stalled.store(true, Ordering::Relaxed);
-    let mut command = chalumeau(directory, &knob.path, "knob", &["--arm", "60"]);
-    let running = Running(command.stdin(stdin).stderr(Stdio::piped()).spawn().unwrap());
-    thread::sleep(Duration::from_secs(3));
-    knob.faults.stalled.store(false, Ordering::Relaxed);
-    (knob, running)
+/// A knob that answers only two seconds after the program has begun to look for it, and the program, which wants to arm it.
+struct Late {
+    knob: PtyKnob,
+    running: Running,
+    shown: Arc<Mutex<Vec<u8>>>,
+    reading: JoinHandle<()>,
+}
+
+impl Late {
+    fn new(directory: &TempDir, stdin: Stdio) -> Self {
+        let knob = PtyKnob::plug(None, &Setup::default());
+        knob.faults.stalled.store(true, Ordering::Relaxed);
+        let mut command = chalumeau(directory, &knob.path, "knob", &["--arm", "60"]);
+        let mut running = Running(command.stdin(stdin).stderr(Stdio::piped()).spawn().unwrap());
+        let mut out = running.0.stderr.take().unwrap();
+        let shown = Arc::new(Mutex::new(Vec::new()));
+        let kept = shown.clone();
+        let reading = thread::spawn(move || {
+            let mut bytes = [0; 256];
+            while let Ok(length @ 1..) = out.read(&mut bytes) {
+                kept.lock().unwrap().extend_from_slice(&bytes[..length]);
+            }
+        });
+        let late = Self { knob, running, shown, reading };
+        soon("the program looks for it", || late.said().contains("waiting for an answer"));
+        thread::sleep(Duration::from_secs(2));
+        late.knob.faults.stalled.store(false, Ordering::Relaxed);
+        late
+    }
+
+    fn said(&self) -> String {
+        String::from_utf8_lossy(&self.shown.lock().unwrap()).into_owned()
+    }
 }
 
 #[test]
 fn a_knob_that_answers_late_is_armed_after_enter_alone() {
     let (_alone, directory) = (alone(), tempfile::tempdir().unwrap());
-    let (knob, mut running) = late(&directory, Stdio::null());
-    soon("ended", || running.0.try_wait().unwrap().is_some());
-    let mut said = String::new();
-    running.0.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-    assert!(!running.0.wait().unwrap().success() && said.contains("nobody is at a terminal"), "{said}");
-    assert_eq!(arms(&knob), 0);
+    let mut late = Late::new(&directory, Stdio::null());
+    soon("ended", || late.running.0.try_wait().unwrap().is_some());
+    soon("told", || late.said().contains("nobody is at a terminal"));
+    assert!(!late.running.0.wait().unwrap().success());
+    assert_eq!(arms(&late.knob), 0);
 
     let (mut terminal, slave) = TTYPort::pair().unwrap();
     let name = slave.name().unwrap();
     assert!(Command::new("stty").args(["-F", &name, "sane"]).status().unwrap().success());
     let keys = OpenOptions::new().read(true).write(true).open(&name).unwrap();
-    let (knob, mut running) = late(&directory, Stdio::from(keys));
-    let mut out = running.0.stderr.take().unwrap();
-    let shown = Arc::new(Mutex::new(Vec::new()));
-    let kept = shown.clone();
-    let reading = thread::spawn(move || {
-        let mut bytes = [0; 256];
-        while let Ok(length @ 1..) = out.read(&mut bytes) {
-            kept.lock().unwrap().extend_from_slice(&bytes[..length]);
-        }
-    });
-    soon("asked", || String::from_utf8_lossy(&shown.lock().unwrap()).contains("press Enter"));
-    stays_limp(&knob);
-    assert_eq!(arms(&knob), 0);
+    let late = Late::new(&directory, Stdio::from(keys));
+    soon("asked", || late.said().contains("press Enter"));
+    stays_limp(&late.knob);
+    assert_eq!(arms(&late.knob), 0);
     terminal.write_all(b"\n").unwrap();
-    armed(&knob);
-    running.signal("-INT");
-    limp(&knob);
-    reading.join().unwrap();
+    armed(&late.knob);
+    late.running.signal("-INT");
+    limp(&late.knob);
+    drop(late.running);
+    late.reading.join().unwrap();
     drop(slave);
 }
 
