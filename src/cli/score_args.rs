@@ -208,7 +208,8 @@ impl ScoreArgs {
 
     /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
     pub fn prepare(&self) -> Result<RenderJob, Failure> {
-        let Planned { file, settings, mut parts, unplayed, keys, trims, take, mut warnings, .. } = self.plan()?;
+        let Planned { file, settings, mut parts, unplayed, keys, trims, take, mut warnings, .. } =
+            self.plan()?;
         let mut model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         if let Some(keys) = keys {
             Arc::make_mut(&mut model).keys = keys;

@@ -304,7 +304,7 @@ fn a_glissando_begins_at_the_fingering_and_the_pitch_that_sound() {
     // Even keys are 45 cents flat. Odd keys play the note below, 45 cents sharp.
     let hz = |key: u8| {
         SoundingNote(key & !1).frequency_hz(440.0)
-            * f64::from(if key & 1 == 0 { -45.0 } else { 45.0 } / 1_200.0).exp2()
+            * (if key & 1 == 0 { -45.0_f64 } else { 45.0 } / 1_200.0).exp2()
     };
     let mut model = Model::clone(&Model::built_in(RATE_HZ).unwrap());
     model.keys = KeyPitches::from_hz(|key| Some(hz(key)));
