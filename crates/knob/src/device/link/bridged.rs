@@ -180,7 +180,8 @@ mod tests {
 
     #[test]
     fn every_end_takes_all_torque_away_and_then_nothing_more_is_said() {
-        let ends: [(&str, fn(&mut BridgedFeel)); 6] = [
+        type End = fn(&mut BridgedFeel);
+        let ends: [(&str, End); 6] = [
             ("disarmed", |feels| feels.disarm()),
             ("stop", |feels| {
                 feels.watch(&Pulse { released: Some(Release::Stop), ..pulse(2_000) }, true, 2_000);
