@@ -91,14 +91,15 @@ export const settled = async (page, place) => {
 };
 export const silence = (page) => until(page, LEVEL, 0, SILENT);
 
-/** Runs tests, all or those with `wanted` in their names, and ends the program with their result. */
-export function running(wanted = '') {
+/** Runs tests, all or those with `wanted` in their names, each after `begin`, and ends the program with their result. */
+export function running(wanted = '', begin = () => {}) {
   let [failed, ran] = [0, 0];
   return {
     async run(tests, ...args) {
       for (const [name, test] of Object.entries(tests).filter(([name]) => name.includes(wanted))) {
         const began = Date.now();
         ran += 1;
+        begin();
         try {
           const says = await test(...args);
           console.log(`ok    ${name} (${((Date.now() - began) / 1000).toFixed(1)} s)${says ? `: ${says}` : ''}`);

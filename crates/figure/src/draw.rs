@@ -300,8 +300,8 @@ mod tests {
     fn every_row_of_a_small_figure_has_its_room() {
         let (own, small) = (Size { width: 1_600, height: 1_500 }, Size { width: 432, height: 405 });
         for (own, small) in ink(own, 15).into_iter().zip(ink(small, 15)) {
-            // A thin line is a little wider there.
-            assert!((own - small).abs() < 0.04, "{own} {small}");
+            // Thin lines are a little wider there.
+            assert!((own - small).abs() < 0.06, "{own} {small}");
         }
     }
 }

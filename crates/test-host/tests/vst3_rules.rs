@@ -6,7 +6,7 @@ mod vst3_host_support;
 #[path = "support/wind.rs"]
 mod wind;
 
-use vst3_host::{AudioBuffers, HostNotification, NoteExpressionType, ProcessMode};
+use vst3_host::{AudioBuffers, BusDirection, HostNotification, MediaType, NoteExpressionType, ProcessMode};
 use vst3_host_support::*;
 use wind::{RATE, SECOND, quiet};
 
@@ -94,6 +94,21 @@ fn what_is_saved_and_no_parameter_marks_the_project_as_changed() {
     // Without a window the host's next call on its main thread brings it.
     loaded.plugin.stop_processing().unwrap();
     assert_eq!(dirty(&mut loaded), 1, "it has measured another room");
+}
+
+#[test]
+fn a_microphone_whose_input_the_host_has_switched_off_plays_like_one_without_sound() {
+    let _turn = turn();
+    let sound = |is_active| {
+        let mut loaded = load_class(256, Some(MICROPHONE));
+        loaded.plugin.set_bus_active(MediaType::Audio, BusDirection::Input, 0, is_active).unwrap();
+        loaded.plugin.start_processing().unwrap();
+        play_on(&mut loaded, 256, &[(0, Word::Set("Microphone", 1.0)), (10, on(60))], SECOND / 4)
+    };
+    let active = sound(true);
+    assert!(peak(&active) > 0.01);
+    // The host gives null pointers for its channels.
+    assert!(sound(false) == active);
 }
 
 #[test]
