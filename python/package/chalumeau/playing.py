@@ -377,7 +377,7 @@ class Clarinet:
         timed = []
         for event in events:
             try:
-                at_s, name, *arguments = event
+                at_s, name, *given = event
             except (TypeError, ValueError):
                 raise TypeError(f"an event is (at_s, method, *arguments), not {event!r}") from None
             if name not in _EVENTS:
@@ -385,20 +385,20 @@ class Clarinet:
             at = self._samples(at_s, "the time of an event")
             if at > length:
                 raise ValueError(f"event at {at_s} s is after the end, {seconds} s")
-            timed.append((at, name, tuple(arguments)))
+            timed.append((at, name, tuple(given)))
         timed.sort(key=lambda one: one[0])
         settings = self._settings
         for at, name, arguments in timed:
             where = f"event {name} at {at / self.rate:g} s"
             try:
-                given = inspect.signature(getattr(self, name)).bind(*arguments).arguments
+                bound = inspect.signature(getattr(self, name)).bind(*arguments).arguments
                 if name == "set":
                     settings = _changed(settings, *arguments)
                     self._voice.check(pairs(settings), self._instrument)
                 elif name == "hole":
                     self._hole(*arguments)
                 else:
-                    for argument, value in given.items():
+                    for argument, value in bound.items():
                         _CHECKS[argument](value)
             except (TypeError, ValueError) as error:
                 raise type(error)(f"{where}: {error}") from error

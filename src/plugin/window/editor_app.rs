@@ -269,7 +269,8 @@ impl NiceEguiApp for EditorApp {
         });
         let size = ui.ctx().content_rect().size();
         let zoom = ui.ctx().zoom_factor();
-        let seen = self.size.look(zoom, (size.x, size.y), Instant::now());
+        let asked = memory.state.kept.fitted_size(room);
+        let seen = self.size.look(zoom, (size.x, size.y), asked, Instant::now());
         match seen {
             Seen::Zoomed => resize(ui, &memory.state.kept),
             Seen::Dragged => memory.state.kept.resized(size.x, size.y, room),

@@ -155,7 +155,11 @@ impl Parts {
 
     /// See [`MidiDecoder::set_breath_from`].
     pub fn set_breath_from(&mut self, from: BreathFrom) -> &[PartEvent] {
-        self.tell_all(|part| part.set_breath_from(from))
+        self.tell_all(|part| part.set_breath_from(from));
+        if self.said.iter().any(|said| said.event == Event::BreathFromKeys) {
+            self.origin = None;
+        }
+        &self.said
     }
 
     /// See [`MidiDecoder::set_links`].

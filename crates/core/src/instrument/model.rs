@@ -83,7 +83,7 @@ pub enum BuildError {
     /// The host rate, Hz, lies outside [`HOST_RATES_HZ`](super::internal_rate::HOST_RATES_HZ).
     #[error("sample rate must lie in 1000..1536000 Hz, got {0}")]
     Rate(f64),
-    /// The pitch of A4, Hz, lies outside [`A4_RANGE_HZ`](super::concert_pitch::A4_RANGE_HZ).
+    /// The pitch of A4, Hz, lies outside [`A4_RANGE_HZ`].
     #[error("A4 must lie in {low}..{high} Hz, got {0}", low = A4_RANGE_HZ.0, high = A4_RANGE_HZ.1)]
     A4(f64),
     /// The caller ended the preparation.

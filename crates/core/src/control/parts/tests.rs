@@ -352,3 +352,15 @@ fn at_the_end_of_a_piece_pedal_and_keys_come_up() {
     assert_eq!(said(parts.let_go()), [off(0, 60), off(1, 64)]);
     assert!(parts.let_go().is_empty());
 }
+
+#[test]
+fn another_choice_of_what_may_blow_forgets_what_has_blown() {
+    let mut parts = Parts::new(2);
+    parts.set_breath_from(BreathFrom::Any);
+    chord(&mut parts, &[60]);
+    parts.controller(0, 2, 64);
+    parts.controller(0, 2, 65);
+    assert!(parts.breath_origin().is_some());
+    parts.set_breath_from(BreathFrom::Keys);
+    assert_eq!(parts.breath_origin(), None);
+}
