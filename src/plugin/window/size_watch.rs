@@ -50,7 +50,8 @@ impl SizeWatch {
             self.settle(now);
             return Seen::Zoomed;
         }
-        let is_size = |other: (f32, f32)| (other.0 - size.0).abs() <= SAME && (other.1 - size.1).abs() <= SAME;
+        let is_size =
+            |other: (f32, f32)| (other.0 - size.0).abs() <= SAME && (other.1 - size.1).abs() <= SAME;
         let had_come = self.has_come;
         self.has_come |= is_size(asked);
         if !had_come && now.duration_since(since) < SETTLES_WITHIN {
