@@ -82,7 +82,7 @@ pub struct Chalumeau {
     /// The settings that the instrument has.
     settings: Settings,
     inputs: HostInputs,
-    /// Of which keys of which instrument the inputs know whether they play.
+    /// The settings and the instrument, by its address, of which inputs and knob know what the keys play.
     keys_of: Option<(Reach, usize)>,
     microphone: Microphone,
     moved: MovedParameters,
@@ -199,6 +199,8 @@ impl Chalumeau {
         context: &mut impl ActivateContext<P>,
     ) -> bool {
         self.offline = config.process_mode == ProcessMode::Offline;
+        // Another instrument may come to lie where one was.
+        self.keys_of = None;
         self.start_threads();
         let Some(loader) = &mut self.loader else { return false };
         let activated = loader.activate(&mut self.instrument, f64::from(config.sample_rate), self.offline);
@@ -359,7 +361,12 @@ impl Chalumeau {
         let model = instrument.ensemble().first().model();
         let of = Some((settings.reach, Arc::as_ptr(model).addr()));
         if std::mem::replace(&mut self.keys_of, of) != of {
-            self.inputs.playing_keys(settings.reach.key_notes(model).playing());
+            let notes = settings.reach.key_notes(model);
+            self.inputs.playing_keys(notes.playing());
+            #[cfg(feature = "devices")]
+            if let Some((_, audio)) = &mut self.knob {
+                audio.set_notes(notes);
+            }
         }
         Some((settings, has_changed))
     }

@@ -79,9 +79,9 @@ fn settings_without_an_effect_are_told() {
             "--dynamic mf --breath-full 8",
             "--breath-full has no effect: it is for a breath that is a pressure",
         ),
-        ("--vibrato-rate 6", "--vibrato-rate has no effect: it is of a vibrato"),
+        ("--vibrato-rate 6", "--vibrato-rate has no effect: it is for a vibrato"),
         ("--growl-interval 7", "add --growl"),
-        ("--set rsize=20", "--set rsize has no effect: it is of a room"),
+        ("--set rsize=20", "--set rsize has no effect: it is for a room"),
         ("--set ldist=2", "add --set heard=position"),
         ("--seats 0.3", "add --players"),
     ] {

@@ -12,7 +12,7 @@ use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::control::knob::slap_strength;
 use chalumeau_core::event::{Event, PartEvent, Played, Timed, To};
-use chalumeau_core::instrument::{Channels, Reach, Settings};
+use chalumeau_core::instrument::{Channels, KeyNotes, Settings};
 use chalumeau_knob::device::{KnobReader, Release};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::NO_MOTOR;
@@ -48,8 +48,6 @@ pub struct KnobAudio {
     /// A replay that was loaded before playing began. Until the first replay ends, it takes precedence over what the controller
     /// has loaded since.
     prepared: Option<PreparedReplay>,
-    /// The settings and the instrument (its address) whose notes the keys play.
-    notes_of: Option<(Reach, usize)>,
     /// The last block replayed a take.
     replays: bool,
     /// A replay has ended since playing began.
@@ -108,10 +106,14 @@ impl KnobAudio {
             sound,
             replayed: 0,
             prepared: None,
-            notes_of: None,
             replays: false,
             has_replayed: false,
         }
+    }
+
+    /// Which notes the keys play. Real-time safe.
+    pub fn set_notes(&mut self, notes: KeyNotes) {
+        self.blower.set_notes(notes);
     }
 
     /// Loads the take to replay before playing begins, so that it plays from the first sample and every render of a file
@@ -211,11 +213,6 @@ impl KnobAudio {
         self.breath_from = breath_from;
         let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
         let (shared, sent) = (&self.shared, &mut self.sent);
-        let model = instrument.ensemble().first().model();
-        let of = Some((settings.reach, Arc::as_ptr(model).addr()));
-        if std::mem::replace(&mut self.notes_of, of) != of {
-            self.blower.set_notes(settings.reach.key_notes(model));
-        }
         let mut on_breath = |at: usize, breath: Breath14| {
             shared.breath.store(breath.unit().to_bits(), Ordering::Relaxed);
             sent.push(at, breath);
