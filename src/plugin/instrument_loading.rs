@@ -13,7 +13,7 @@ pub mod instrument_loader;
 pub mod instrument_request;
 pub mod instrument_swap;
 
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use chalumeau_core::instrument::{Ensemble, Model};
@@ -21,9 +21,6 @@ use instrument_request::InstrumentRequest;
 
 pub use instrument_loader::InstrumentLoader;
 pub use instrument_swap::InstrumentSwap;
-
-/// The loader has finished with no choice yet.
-const NO_CHOICE: u32 = u32::MAX;
 
 /// Transposition before the first activation: a B flat clarinet sounds two semitones lower than written.
 const BUILT_IN_TRANSPOSITION: i8 = 2;
@@ -62,29 +59,23 @@ struct Activation {
     current: Option<CurrentInstrument>,
     /// Counts activations. Work that began under an earlier number is discarded.
     number: u64,
+    /// What [`SharedInstrument::asked`] was when the host activated the plugin.
+    asked_before: u64,
 }
 
 /// What the threads share about the instrument. Only the main thread, the loader, the knob controller and the snapshot
 /// thread take the lock.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct SharedInstrument {
     activation: Mutex<Activation>,
-    /// The value of *Instrument*, as a number, for which the loader has nothing left to do.
-    finished_choice: AtomicU32,
+    /// How often the audio thread of an offline render has asked the loader to do all that the parameters ask for.
+    asked: AtomicU64,
+    /// The latest of these questions that the loader has answered.
+    answered: AtomicU64,
     /// The latest request was refused, and the instrument before it plays on.
     is_refused: AtomicBool,
+    /// The loader's thread is to end, or never began.
     stop: AtomicBool,
-}
-
-impl Default for SharedInstrument {
-    fn default() -> Self {
-        Self {
-            activation: Mutex::default(),
-            finished_choice: AtomicU32::new(NO_CHOICE),
-            is_refused: AtomicBool::new(false),
-            stop: AtomicBool::new(false),
-        }
-    }
 }
 
 impl SharedInstrument {

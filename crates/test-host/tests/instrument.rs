@@ -307,6 +307,23 @@ fn an_offline_render_waits_for_its_instrument_and_repeats() {
 }
 
 #[test]
+fn an_offline_render_begins_with_the_parameters_of_its_first_block() {
+    let render = |before: bool| {
+        let mut plugin = plugin();
+        plugin.set_offline(true).unwrap();
+        let a4 = plugin.param("A4").unwrap();
+        let mut said = vec![At(0, breath(64)), At(0, on(57))];
+        if before {
+            plugin.set(a4.id, a4.max).unwrap();
+        } else {
+            said.insert(0, At(0, Say::Set(a4.id, a4.max)));
+        }
+        plugin.play(RATE, BLOCK, &said, SECOND).unwrap()
+    };
+    assert!(render(true) == render(false), "a clarinet of that size from the first sample on");
+}
+
+#[test]
 fn a_project_begins_with_its_own_instrument() {
     let mut plugin = plugin();
     plugin.set_offline(true).unwrap();

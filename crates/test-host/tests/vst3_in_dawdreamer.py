@@ -148,12 +148,7 @@ def values_set_live_sound_like_the_same_values_from_a_state():
         for parameter in plugin.get_parameters_description():
             # Switches of the knob, and another instrument, which is exchanged while it plays.
             if parameter["name"] in OURS[:-1]:
-                value = float(random.uniform())
-                # DawDreamer makes the plugin ready for a bounce when it loads it. From then on the player follows an A4 outside
-                # 430..450 Hz, and a clarinet of that size comes with the next start.
-                if parameter["name"] == "A4":
-                    value = (430 + 20 * value - 415) / (466 - 415)
-                plugin.set_parameter(parameter["index"], value)
+                plugin.set_parameter(parameter["index"], float(random.uniform()))
         heard = []
         for _ in range(2):
             plugin.clear_midi()

@@ -12,9 +12,7 @@ use std::time::{Duration, Instant};
 use nice_plug::prelude::nice_log;
 
 use super::instrument_request::InstrumentRequest;
-use super::{
-    Activation, CurrentInstrument, InstrumentSwap, NO_CHOICE, Readiness, SharedInstrument, SwapCandidate,
-};
+use super::{Activation, CurrentInstrument, InstrumentSwap, Readiness, SharedInstrument, SwapCandidate};
 use crate::cache::Cache;
 use crate::plugin::mts_esp::MtsClient;
 use crate::plugin::params::ChalumeauParams;
@@ -66,7 +64,8 @@ impl InstrumentLoader {
         };
         let thread =
             std::thread::Builder::new().name("InstrumentLoader".to_owned()).spawn(move || thread.run());
-        // Without a thread the plugin still gets an instrument at each activation.
+        // Without a thread the plugin still gets an instrument at each activation, and must not wait for more.
+        shared.stop.store(thread.is_err(), Ordering::Relaxed);
         let ends = Some((incoming, outgoing));
         Self { params, shared, thread: thread.ok(), cache, tuning_program, activations: 0, ends }
     }
@@ -84,7 +83,6 @@ impl InstrumentLoader {
         // The thread drops its work when it sees the new activation.
         let before =
             std::mem::replace(&mut *self.shared.activation(), Activation { number, ..Activation::default() });
-        self.shared.finished_choice.store(NO_CHOICE, Ordering::Release);
         receive_tuning(self.tuning_program.as_deref(), &self.params);
         let request = InstrumentRequest::from_params(&self.params, host_rate_hz, offline);
         let at_rate = before.current.filter(|current| current.request.host_rate_hz == host_rate_hz);
@@ -104,18 +102,24 @@ impl InstrumentLoader {
         });
         let ensemble = (!same).then(|| Box::new(Ensemble::new(current.model.clone(), host_rate_hz)));
         match (swap.as_mut(), ensemble) {
-            (Some(swap), ensemble) => swap.activate(ensemble, host_rate_hz, number, request.choice),
+            (Some(swap), ensemble) => swap.activate(ensemble, host_rate_hz, number),
             (None, Some(ensemble)) => {
                 if let Some((incoming, outgoing)) = self.ends.take() {
                     let mut new = InstrumentSwap::new(self.shared.clone(), ensemble, incoming, outgoing);
-                    new.activate(None, host_rate_hz, number, request.choice);
+                    new.activate(None, host_rate_hz, number);
                     *swap = Some(new);
                 }
             }
             (None, None) => {}
         }
-        *self.shared.activation() =
-            Activation { host_rate_hz: Some(host_rate_hz), offline, current: Some(current), number };
+        let asked_before = self.shared.asked.load(Ordering::Acquire);
+        *self.shared.activation() = Activation {
+            host_rate_hz: Some(host_rate_hz),
+            offline,
+            current: Some(current),
+            number,
+            asked_before,
+        };
         Ok(())
     }
 
@@ -231,14 +235,17 @@ impl LoaderThread {
         while self.from_audio.pop().is_ok() {}
         self.push();
         self.ending.retain(|thread| !thread.is_finished());
+        // Before the parameters: what is asked later may ask for others.
+        let asked = self.shared.asked.load(Ordering::Acquire);
+        let answered = self.shared.answered.load(Ordering::Relaxed);
         let activation = self.shared.activation().clone();
         let (Some(host_rate_hz), Some(current)) = (activation.host_rate_hz, &activation.current) else {
             return self.cancel_job();
         };
         receive_tuning(self.tuning_program.as_deref(), &self.params);
         let mut request = InstrumentRequest::from_params(&self.params, host_rate_hz, activation.offline);
-        if activation.offline {
-            // During an offline render only a new choice exchanges the instrument; the player follows A4.
+        if activation.offline && asked > activation.asked_before && asked == answered {
+            // Once an offline render has begun, only a new choice exchanges the instrument; the player follows A4.
             let known = self.job.iter().map(|job| &job.request).chain([&current.request]);
             if let Some(known) = known.into_iter().find(|known| known.choice == request.choice) {
                 request = known.clone();
@@ -261,7 +268,11 @@ impl LoaderThread {
         let same_instrument = request.source == current.request.source
             && request.quality == current.request.quality
             && request.alterations == current.request.alterations;
-        if request.alterations != current.request.alterations && self.since_handed.elapsed() < DRAG {
+        let is_awaited = asked != answered;
+        if request.alterations != current.request.alterations
+            && self.since_handed.elapsed() < DRAG
+            && !is_awaited
+        {
             return;
         }
         let differs_in_keys = current.request.differs_in_keys_at_most(&request) && current.request != request;
@@ -272,16 +283,16 @@ impl LoaderThread {
             let _ = self.hand_over(&request, activation.number, model, readiness);
             return;
         }
-        if same_instrument && request != current.request && self.since.elapsed() < SETTLE {
+        if same_instrument && request != current.request && self.since.elapsed() < SETTLE && !is_awaited {
             return;
         }
         if request == current.request && current.readiness == Readiness::Tuned {
             self.refused = None;
             self.shared.is_refused.store(false, Ordering::Relaxed);
             report(&self.params, &status_text(Readiness::Tuned, current));
-            self.finish(&request);
+            self.answer(asked);
         } else if self.refused.as_ref() == Some(&request) {
-            self.finish(&request);
+            self.answer(asked);
         } else if let Err(Interrupted::Failed(reason)) = self.advance(&request, &activation, current) {
             report(&self.params, &refusal_text(&reason, current));
             self.shared.is_refused.store(true, Ordering::Relaxed);
@@ -289,10 +300,10 @@ impl LoaderThread {
         }
     }
 
-    /// Tells the audio thread that no better instrument will come for this choice.
-    fn finish(&self, request: &InstrumentRequest) {
+    /// Tells the audio thread that no better instrument will come for the parameters as they were when it asked.
+    fn answer(&self, asked: u64) {
         if self.waiting.is_none() {
-            self.shared.finished_choice.store(request.choice, Ordering::Release);
+            self.shared.answered.store(asked, Ordering::Release);
         }
     }
 

@@ -33,8 +33,8 @@ pub struct InstrumentSwap {
     settings: Settings,
     stereo: Stereo,
     activation: u64,
-    /// The value of *Instrument* that was waited for last.
-    awaited_choice: u32,
+    /// The value of *Instrument* that was waited for last in this activation.
+    awaited_choice: Option<u32>,
     rate_hz: f64,
     warm_up: usize,
     fade: usize,
@@ -64,7 +64,7 @@ impl InstrumentSwap {
             settings: Settings::default(),
             stereo: Stereo::new(48_000.0),
             activation: 0,
-            awaited_choice: 0,
+            awaited_choice: None,
             rate_hz: 0.0,
             warm_up: 0,
             fade: 1,
@@ -72,18 +72,12 @@ impl InstrumentSwap {
     }
 
     /// Begins a new activation. `ensemble` replaces the instrument if the old one does not fit. [main thread]
-    pub(super) fn activate(
-        &mut self,
-        ensemble: Option<Box<Ensemble>>,
-        rate_hz: f64,
-        activation: u64,
-        choice: u32,
-    ) {
+    pub(super) fn activate(&mut self, ensemble: Option<Box<Ensemble>>, rate_hz: f64, activation: u64) {
         self.next = None;
         if let Some(ensemble) = ensemble {
             self.playing = ensemble;
         }
-        (self.activation, self.awaited_choice) = (activation, choice);
+        (self.activation, self.awaited_choice) = (activation, None);
         self.rate_hz = rate_hz;
         self.stereo = Stereo::new(rate_hz);
         self.stereo.set_space(&self.settings);
@@ -136,14 +130,18 @@ impl InstrumentSwap {
         }
     }
 
-    /// Waits until the loader has finished with `choice`, the value of *Instrument*. Only for an offline render: this is
-    /// the one place where the audio thread waits.
+    /// Waits until the loader has done all that the parameters ask for: in the first block of an activation, because a
+    /// host may send it parameters that come after the activation, and when `choice`, the value of *Instrument*, changes.
+    /// Only for an offline render: this is the one place where the audio thread waits.
     pub fn wait_for(&mut self, choice: u32) {
-        if std::mem::replace(&mut self.awaited_choice, choice) == choice {
+        if self.awaited_choice.replace(choice) == Some(choice) {
             return;
         }
+        let asked = self.shared.asked.fetch_add(1, Ordering::Release) + 1;
         let began = Instant::now();
-        while self.shared.finished_choice.load(Ordering::Acquire) != choice && began.elapsed() < LONGEST_WAIT
+        while self.shared.answered.load(Ordering::Acquire) < asked
+            && !self.shared.stop.load(Ordering::Relaxed)
+            && began.elapsed() < LONGEST_WAIT
         {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -293,7 +291,7 @@ mod tests {
         let (send, incoming) = rtrb::RingBuffer::new(4);
         let (outgoing, back) = rtrb::RingBuffer::new(8);
         let mut swap = InstrumentSwap::new(Arc::default(), built_in(), incoming, outgoing);
-        swap.activate(None, RATE, 1, 0);
+        swap.activate(None, RATE, 1);
         swap.set_settings(&Settings::default());
         SwapEnds { swap, send, back }
     }
