@@ -33,6 +33,8 @@ pub struct InstrumentSwap {
     settings: Settings,
     stereo: Stereo,
     activation: u64,
+    /// Nothing was rendered since the activation or a reset.
+    is_unheard: bool,
     /// The value of *Instrument* that was waited for last in this activation.
     awaited_choice: Option<u32>,
     rate_hz: f64,
@@ -64,6 +66,7 @@ impl InstrumentSwap {
             settings: Settings::default(),
             stereo: Stereo::new(48_000.0),
             activation: 0,
+            is_unheard: true,
             awaited_choice: None,
             rate_hz: 0.0,
             warm_up: 0,
@@ -78,6 +81,7 @@ impl InstrumentSwap {
             self.playing = ensemble;
         }
         (self.activation, self.awaited_choice) = (activation, None);
+        self.is_unheard = true;
         self.rate_hz = rate_hz;
         self.stereo = Stereo::new(rate_hz);
         self.stereo.set_space(&self.settings);
@@ -158,7 +162,8 @@ impl InstrumentSwap {
                 ensemble.set_settings(&self.settings);
                 ensemble.carry_on(&self.playing);
                 // Silence needs no fade.
-                let played = if self.playing.is_silent() { self.warm_up + self.fade } else { 0 };
+                let is_silent = self.is_unheard || self.playing.is_silent();
+                let played = if is_silent { self.warm_up + self.fade } else { 0 };
                 self.next = Some(NextInstrument { ensemble, played });
                 self.finish_swap();
             }
@@ -191,6 +196,7 @@ impl InstrumentSwap {
             next.played = self.warm_up + self.fade;
         }
         self.finish_swap();
+        self.is_unheard = true;
         self.stereo.reset();
         self.playing.reset();
         if let Some(next) = &mut self.next {
@@ -200,6 +206,7 @@ impl InstrumentSwap {
 
     /// See [`Ensemble::render_events_channels`]; both instruments receive the events.
     pub fn render_events(&mut self, events: impl IntoIterator<Item = Timed<PartEvent>>, mut out: Channels) {
+        self.is_unheard = false;
         let is_lone = self.playing.is_lone();
         if self.next.is_none() {
             let stereo = &mut self.stereo;
