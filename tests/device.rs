@@ -486,7 +486,7 @@ fn over_midi_the_same_firmware_is_played_and_felt() {
             device.run_until(begun.elapsed().as_micros() as u64);
             was_armed |= device.firmware.is_armed();
             let mut out = [0; 2048];
-            let length = device.firmware.transmit_midi(&mut out);
+            let length = device.firmware.transmit(&mut out);
             let _ = port.send(&out[..length]);
         }
         was_armed

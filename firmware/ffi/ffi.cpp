@@ -122,12 +122,6 @@ float fw_law(const std::uint8_t* payload, float angle_deg) {
     return Curve(feel).at_rest(angle_deg);
 }
 
-float fw_torque(const std::uint8_t* payload, float angle_deg, float velocity) {
-    Feel feel;
-    feel.decode(payload, Feel::LENGTH);
-    return Curve(feel).torque(angle_deg, velocity);
-}
-
 FwVerdict fw_check(const std::uint8_t* payload, float knob_damping_nms, std::uint16_t ceiling_mnm) {
     Config config;
     config.knob_damping_nms = knob_damping_nms;
@@ -140,15 +134,6 @@ FwVerdict fw_check(const std::uint8_t* payload, float knob_damping_nms, std::uin
 
 FwCounts fw_decode(const std::uint8_t* bytes, std::size_t length) {
     SerialDecoder decoder;
-    Frame frame;
-    for (std::size_t i = 0; i < length; ++i) {
-        decoder.push(bytes[i], frame);
-    }
-    return counts_of_reader(decoder.reader.counts);
-}
-
-FwCounts fw_decode_midi(const std::uint8_t* bytes, std::size_t length) {
-    MidiDecoder decoder;
     Frame frame;
     for (std::size_t i = 0; i < length; ++i) {
         decoder.push(bytes[i], frame);

@@ -51,10 +51,8 @@ unsafe extern "C" {
     fn fw_info(device: *const u64, payload: *mut u8);
     fn fw_counts(device: *const u64) -> Counts;
     fn fw_law(feel: *const u8, angle_deg: f32) -> f32;
-    fn fw_torque(feel: *const u8, angle_deg: f32, velocity: f32) -> f32;
     fn fw_check(feel: *const u8, knob_damping_nms: f32, ceiling_mnm: u16) -> RawVerdict;
     fn fw_decode(bytes: *const u8, length: usize) -> Counts;
-    fn fw_decode_midi(bytes: *const u8, length: usize) -> Counts;
     fn fw_seed_flow(index: u16, h: f32, k: f32) -> f32;
     fn fw_physical_flow(index: f32, h: f32, k: f32) -> f32;
 }
@@ -170,11 +168,6 @@ pub fn law(feel: &FeelBytes, angle_deg: f32) -> f32 {
     unsafe { fw_law(feel.as_ptr(), angle_deg) }
 }
 
-pub fn torque(feel: &FeelBytes, angle_deg: f32, velocity: f32) -> f32 {
-    // SAFETY: as above.
-    unsafe { fw_torque(feel.as_ptr(), angle_deg, velocity) }
-}
-
 pub fn check(feel: &FeelBytes, knob_damping_nms: f32, ceiling_mnm: u16) -> Refused {
     // SAFETY: as above.
     let verdict = unsafe { fw_check(feel.as_ptr(), knob_damping_nms, ceiling_mnm) };
@@ -184,11 +177,6 @@ pub fn check(feel: &FeelBytes, knob_damping_nms: f32, ceiling_mnm: u16) -> Refus
 pub fn decode(bytes: &[u8]) -> Counts {
     // SAFETY: pointer and length are one slice's.
     unsafe { fw_decode(bytes.as_ptr(), bytes.len()) }
-}
-
-pub fn decode_midi(bytes: &[u8]) -> Counts {
-    // SAFETY: as above.
-    unsafe { fw_decode_midi(bytes.as_ptr(), bytes.len()) }
 }
 
 pub fn seed_flow(index: u16, h: f32, k: f32) -> f32 {

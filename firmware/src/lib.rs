@@ -171,13 +171,9 @@ impl Firmware {
         self.device.command(torque_mnm)
     }
 
-    /// Bytes for the host, serial; the number written. Call often: what does not fit 1024 bytes is dropped and counted.
+    /// Bytes for the host; the number written. A device that speaks MIDI writes SysEx and controllers, whole messages one
+    /// after the other. Call often: what does not fit 1024 bytes is dropped and counted.
     pub fn transmit(&mut self, out: &mut [u8]) -> usize {
-        self.device.transmit(out)
-    }
-
-    /// The same of a device that speaks MIDI: SysEx and controllers, whole messages one after the other.
-    pub fn transmit_midi(&mut self, out: &mut [u8]) -> usize {
         self.device.transmit(out)
     }
 
@@ -217,19 +213,9 @@ pub fn law_torque_mnm(feel: &FeelBytes, angle_deg: f32) -> f32 {
     core::law(feel, angle_deg)
 }
 
-/// The same with what movement adds; velocity in rad/s.
-pub fn moving_torque_mnm(feel: &FeelBytes, angle_deg: f32, velocity: f32) -> f32 {
-    core::torque(feel, angle_deg, velocity)
-}
-
-/// Whether a device with this damping of its own (N m s/rad) and the default push limit accepts a feel.
+/// Whether a device with this damping of its own (N m s/rad) and the default ceiling accepts a feel.
 pub fn check_feel(feel: &FeelBytes, knob_damping_nms: f32) -> Result<(), Refused> {
-    check_feel_of(feel, knob_damping_nms, Setup::default().ceiling_mnm)
-}
-
-/// The same for a device with a ceiling of its own, mNm.
-pub fn check_feel_of(feel: &FeelBytes, knob_damping_nms: f32, ceiling_mnm: u16) -> Result<(), Refused> {
-    match core::check(feel, knob_damping_nms, ceiling_mnm) {
+    match core::check(feel, knob_damping_nms, Setup::default().ceiling_mnm) {
         Refused { code: 0, .. } => Ok(()),
         refused => Err(refused),
     }
@@ -238,11 +224,6 @@ pub fn check_feel_of(feel: &FeelBytes, knob_damping_nms: f32, ceiling_mnm: u16) 
 /// What the C++ serial decoder makes of these bytes.
 pub fn decode_counts(bytes: &[u8]) -> Counts {
     core::decode(bytes)
-}
-
-/// What the C++ MIDI decoder makes of these bytes.
-pub fn decode_counts_midi(bytes: &[u8]) -> Counts {
-    core::decode_midi(bytes)
 }
 
 /// The reference flow at an index 0..=3600 of its table: the formula, not closed past H k.
