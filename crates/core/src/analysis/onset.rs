@@ -1,4 +1,4 @@
-//! How notes begin and end.
+//! How notes begin.
 //!
 //! Two readings of the beginning: [`attack_s`] is the one recordings are measured with (10 ms envelope, 10 to 90 % of the
 //! loudest moment, swells included); [`t90_s`] asks how soon a note that was just tongued speaks, through a window of one
@@ -6,14 +6,11 @@
 
 use crate::analysis::pitch::fundamental_hz;
 use crate::analysis::spectrum::{moving_rms, note_envelope};
-use crate::maths;
 
 /// Share of the steady level that counts as speaking.
 const SPEAKING: f64 = 0.9;
 /// Window where no period is found, s.
 const WINDOW_S: f64 = 0.01;
-/// The fit of a decay begins and ends at these shares of the maximum (-3 and -40 dB).
-const DECAY: (f64, f64) = (0.707, 0.01);
 
 /// Time from 10 % to 90 % of the global maximum of the 10 ms envelope within the first 4 s. `None` for silence.
 pub fn attack_s(samples: &[f64], rate_hz: f64) -> Option<f64> {
@@ -43,32 +40,6 @@ pub fn t90_s(samples: &[f64], rate_hz: f64, from_s: f64) -> Option<f64> {
         return None;
     }
     envelope.iter().position(|&value| value >= SPEAKING * steady).map(|n| n as f64 / rate_hz)
-}
-
-/// Time in which the amplitude falls to 1/e after its maximum: a line through the logarithm of the envelope from -3 dB
-/// to -40 dB or the end. `None` if the slice does not fall by 9 dB.
-pub fn decay_time_constant_s(samples: &[f64], rate_hz: f64) -> Option<f64> {
-    let envelope = moving_rms(samples, rate_hz, window_s(samples, rate_hz));
-    let (at, loudest) = envelope.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    if loudest <= 0.0 {
-        return None;
-    }
-    let falling = &envelope[at..];
-    let below = |share: f64| falling.iter().position(|&value| value < share * loudest);
-    let first = below(DECAY.0)?;
-    let end = below(DECAY.1).unwrap_or(falling.len());
-    let fit = &falling[first..end];
-    if fit.len() < 2 || fit[fit.len() - 1] > 0.5 * fit[0] {
-        return None;
-    }
-    let centre = 0.5 * (fit.len() - 1) as f64;
-    let (mut tt, mut ty) = (0.0, 0.0);
-    for (n, value) in fit.iter().enumerate() {
-        let t = n as f64 - centre;
-        tt += t * t;
-        ty += t * maths::ln(*value);
-    }
-    (ty < 0.0).then(|| -tt / ty / rate_hz)
 }
 
 fn window_s(samples: &[f64], rate_hz: f64) -> f64 {
@@ -126,15 +97,5 @@ mod tests {
     fn t90_needs_a_note() {
         assert_eq!(t90_s(&[0.0; 48_000], RATE_HZ, 0.1), None);
         assert_eq!(t90_s(&[0.0; 4800], RATE_HZ, 0.2), None);
-    }
-
-    #[test]
-    fn decay_is_read_through_the_period() {
-        for (f0_hz, tau_s) in [(147.0, 0.03), (440.0, 0.03), (440.0, 0.2)] {
-            let samples = shaped(f0_hz, 1.5, |t| if t < 0.5 { 1.0 } else { ((0.5 - t) / tau_s).exp() });
-            let heard = decay_time_constant_s(&samples, RATE_HZ).unwrap();
-            assert!((heard / tau_s - 1.0).abs() < 0.03, "{f0_hz} Hz, {tau_s} s: {heard}");
-        }
-        assert_eq!(decay_time_constant_s(&shaped(440.0, 0.5, |_| 1.0), RATE_HZ), None);
     }
 }

@@ -31,7 +31,7 @@
 use std::sync::Arc;
 
 use crate::dsp::lanes::has_avx2;
-use crate::dsp::low_pass::{Kernel, LANES, TRANSITION, TapRow, dot, dot_of, normalised, tap_rows};
+use crate::dsp::low_pass::{Kernel, LANES, TapRow, dot, dot_of, normalised, tap_rows};
 use crate::dsp::warp::{BEYOND, ONE, SPEEDS, Warp};
 
 /// Largest number of phases stored exactly; above it, neighbouring phases are mixed linearly.
@@ -86,8 +86,6 @@ pub struct Resampler {
     end: usize,
     /// Group delay of the FIR, input samples.
     delay: f64,
-    pass_hz: f64,
-    stop_hz: f64,
     warp: Warp,
     /// The clock is off its speed or off the grid: `fraction` counts, not `phase`.
     warping: bool,
@@ -158,8 +156,6 @@ impl Resampler {
             next: 0,
             end: 0,
             delay: kernel.half,
-            pass_hz: if l == m { in_hz / 2.0 } else { lower_hz * (0.5 - TRANSITION / 2.0) },
-            stop_hz: if l == m { in_hz / 2.0 } else { lower_hz * (0.5 + TRANSITION / 2.0) },
             warp,
             warping: false,
             fraction: 0,
@@ -365,11 +361,6 @@ impl Resampler {
         (self.delay + 1.0) * self.l as f64 / self.m as f64 - 1.0
     }
 
-    /// Upper edge of the pass band and lower edge of the stop band, Hz. Both half the rate for equal rates.
-    pub fn transition_hz(&self) -> (f64, f64) {
-        (self.pass_hz, self.stop_hz)
-    }
-
     /// Most inputs that an output hears.
     pub fn reach(&self) -> usize {
         self.reach
@@ -418,6 +409,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
+    use crate::dsp::low_pass::TRANSITION;
 
     const PAIRS: [(f64, f64); 11] = [
         (96e3, 48e3),
@@ -503,11 +495,18 @@ mod tests {
         10.0 * (2.0 * tail.iter().map(|&y| f64::from(y).powi(2)).sum::<f64>() / tail.len() as f64).log10()
     }
 
+    /// Upper edge of the pass band and lower edge of the stop band, Hz. Both half the rate for equal rates.
+    fn transition_hz(in_hz: f64, out_hz: f64) -> (f64, f64) {
+        let half = if in_hz == out_hz { 0.0 } else { TRANSITION / 2.0 };
+        let lower_hz = in_hz.min(out_hz);
+        (lower_hz * (0.5 - half), lower_hz * (0.5 + half))
+    }
+
     /// Everything the module's table claims, for every pair in it.
     #[test]
     fn pass_band_is_flat_and_nothing_folds_into_it() {
         for (in_hz, out_hz) in PAIRS {
-            let (pass_hz, stop_hz) = Resampler::new(in_hz, out_hz).transition_hz();
+            let (pass_hz, stop_hz) = transition_hz(in_hz, out_hz);
             let (mut ripple, mut rest, mut alias) = (0.0f64, f64::MIN, f64::MIN);
             for f_hz in [100.0, 1e3, 5e3, 10e3, 18e3, pass_hz].into_iter().filter(|&f_hz| f_hz <= pass_hz) {
                 let heard = heard(in_hz, out_hz, f_hz);

@@ -174,16 +174,7 @@ impl Clock {
 ///
 /// [`MidiFileError`] says what is wrong with the file, and at which byte.
 pub fn read(bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
-    read_as(MidiDecoder::new(), bytes, rate)
-}
-
-/// As [`read`], with a decoder that has been set up for the file.
-///
-/// # Errors
-///
-/// As [`read`].
-pub fn read_as(decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
-    Ok((&read_parts(&mut Parts::of(decoder, 1), bytes, rate)?).into())
+    Ok((&read_parts(&mut Parts::of(MidiDecoder::new(), 1), bytes, rate)?).into())
 }
 
 /// As [`read`], for several players, whose decoders have been set up for the file.
