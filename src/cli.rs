@@ -156,7 +156,7 @@ enum Failure {
     #[error("cannot make the directory {}: {source}", path.display())]
     Folder { path: PathBuf, source: io::Error },
     #[error("cannot write {}: {source}", path.display())]
-    Batch { path: PathBuf, source: io::Error },
+    Write { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Scale(#[from] crate::scale_file::ScaleError),
     #[error(transparent)]
@@ -182,9 +182,6 @@ enum Failure {
     #[cfg(feature = "simulator")]
     #[error("{}: {source}", path.display())]
     HandScript { path: PathBuf, source: chalumeau_knob::simulator::script::ScriptError },
-    #[cfg(feature = "simulator")]
-    #[error("cannot write {}: {source}", path.display())]
-    Write { path: PathBuf, source: io::Error },
     #[cfg(feature = "simulator")]
     #[error("the simulated knob stopped: {0}")]
     Knob(io::Error),

@@ -174,7 +174,7 @@ impl BatchCommand {
         inputs: &'a Inputs,
     ) -> Result<Journal<'a>, Failure> {
         let path = self.into.join(GROWING);
-        let table = new_table(&path).map_err(|source| Failure::Batch { path: path.clone(), source })?;
+        let table = new_table(&path).map_err(|source| Failure::Write { path: path.clone(), source })?;
         let stays = jobs.iter().zip(lines).filter(|(_, line)| line.is_some());
         let made_of = inputs.open(&stays.map(|(job, _)| job.file.clone()).collect::<Vec<_>>())?;
         let mut journal = Journal { path, table, inputs, made_of };
@@ -285,7 +285,7 @@ impl Journal<'_> {
     /// In one piece: a run that is stopped leaves whole lines.
     fn say(&mut self, line: &str) -> Result<(), Failure> {
         let written = self.table.write_all(format!("{line}\n").as_bytes());
-        written.map_err(|source| Failure::Batch { path: self.path.clone(), source })
+        written.map_err(|source| Failure::Write { path: self.path.clone(), source })
     }
 
     /// A file has become ready.

@@ -95,6 +95,6 @@ impl Inputs {
     }
 
     fn failure(&self, source: std::io::Error) -> Failure {
-        Failure::Batch { path: self.path.clone(), source }
+        Failure::Write { path: self.path.clone(), source }
     }
 }
