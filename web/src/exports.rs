@@ -27,18 +27,23 @@ fn with(change: impl FnOnce(&mut Playing)) {
     }
 }
 
-/// Makes an instrument for a sample rate in Hz, by its place among the bundled ones (the first for a place that is not there). It
-/// takes over from the one before. 1, or 0 if the rate is out of range. Allocates.
-#[unsafe(no_mangle)]
-pub extern "C" fn chalumeau_begin(rate_hz: f64, instrument: u32) -> u32 {
-    let instrument = Bundled::ALL.get(instrument as usize).copied().unwrap_or_default();
-    let Ok(mut made) = Playing::new(rate_hz, instrument) else { return 0 };
+/// A made instrument takes over from the one before; 1, for the page.
+fn take_over(mut made: Playing) -> u32 {
     let mut playing = locked();
     if let Some(before) = playing.take() {
         made.carry_on(*before);
     }
     *playing = Some(Box::new(made));
     1
+}
+
+/// Makes an instrument for a sample rate in Hz, by its place among the bundled ones (the first for a place that is not there). It
+/// takes over from the one before. 1, or 0 if the rate is out of range. Allocates.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_begin(rate_hz: f64, instrument: u32) -> u32 {
+    let instrument = Bundled::ALL.get(instrument as usize).copied().unwrap_or_default();
+    let Ok(made) = Playing::new(rate_hz, instrument) else { return 0 };
+    take_over(made)
 }
 
 /// Most samples of one block.
@@ -205,15 +210,10 @@ pub extern "C" fn chalumeau_outbox() -> *const u8 {
 pub extern "C" fn chalumeau_begin_prepared(rate_hz: f64, file: u32) -> u32 {
     let inbox = inbox();
     let texts = std::str::from_utf8(&inbox).ok().and_then(|text| text.split_at_checked(file as usize));
-    let Some(mut made) = texts.and_then(|(file, prepared)| Playing::prepared(rate_hz, file, prepared)) else {
+    let Some(made) = texts.and_then(|(file, prepared)| Playing::prepared(rate_hz, file, prepared)) else {
         return 0;
     };
-    let mut playing = locked();
-    if let Some(before) = playing.take() {
-        made.carry_on(*before);
-    }
-    *playing = Some(Box::new(made));
-    1
+    take_over(made)
 }
 
 /// A port with a knob has been opened; `number` is random. Gives the bytes that the page may write at any time to end torque.
