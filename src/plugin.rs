@@ -100,6 +100,15 @@ pub struct Chalumeau {
     offline: bool,
 }
 
+/// Two channels of sound, and these of a microphone: how the plugin stands where it has no side-chain.
+pub const fn layout(inputs: Option<NonZeroU32>) -> AudioIOLayout {
+    AudioIOLayout {
+        main_input_channels: inputs,
+        main_output_channels: NonZeroU32::new(2),
+        ..AudioIOLayout::const_default()
+    }
+}
+
 impl Plugin for Chalumeau {
     const NAME: &'static str = identity::NAME;
     const VENDOR: &'static str = identity::VENDOR;

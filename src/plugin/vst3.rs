@@ -16,7 +16,7 @@ use nice_plug::prelude::*;
 use nice_plug::wrapper::vst3::HostRequests;
 
 use super::host_link::HostCalls;
-use super::{Chalumeau, executor_of};
+use super::{Chalumeau, executor_of, layout};
 use crate::identity;
 
 /// What tells a class from another.
@@ -35,14 +35,6 @@ pub trait Kind: Send + 'static {
 
 const INSTRUMENT: &[Vst3SubCategory] =
     &[Vst3SubCategory::Instrument, Vst3SubCategory::Synth, Vst3SubCategory::Stereo];
-
-const fn layout(inputs: Option<NonZeroU32>) -> AudioIOLayout {
-    AudioIOLayout {
-        main_input_channels: inputs,
-        main_output_channels: NonZeroU32::new(2),
-        ..AudioIOLayout::const_default()
-    }
-}
 
 /// The plugin with MIDI controllers.
 pub struct Whole;

@@ -11,7 +11,7 @@ use nice_plug::prelude::*;
 use super::jack::JackLink;
 use super::keyboards::WithKeyboards;
 use super::session::Session;
-use crate::plugin::{Chalumeau, executor_of};
+use crate::plugin::{Chalumeau, executor_of, layout};
 
 /// The plugin that plays, for [`StandalonePlugin::end`]. The framework keeps the plugin to itself.
 static PLAYING: Mutex<Option<StandalonePlugin>> = Mutex::new(None);
@@ -40,15 +40,6 @@ impl Default for StandalonePlugin {
         let this = Self { plugin, jack: Arc::new(Mutex::new(jack)), uses_jack, inputs: 0, session };
         *locked(&PLAYING) = Some(this.clone());
         this
-    }
-}
-
-/// The channels of a microphone, and those of the sound.
-const fn layout(inputs: Option<NonZeroU32>) -> AudioIOLayout {
-    AudioIOLayout {
-        main_input_channels: inputs,
-        main_output_channels: NonZeroU32::new(2),
-        ..AudioIOLayout::const_default()
     }
 }
 
