@@ -7,6 +7,7 @@ use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::response::ONSET;
 use chalumeau_core::instrument::techniques::GrowlPitch;
 use chalumeau_core::instrument::{Beyond, BreathResponse, ListeningMode, Split, Tuning};
+use chalumeau_core::reed::law::{H_INIT, K_INIT};
 use chalumeau_knob::device::{FIRST_CEILING_MNM, OFFERED_CEILING_MNM};
 use chalumeau_knob::touch::study::TRIALS;
 
@@ -269,7 +270,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::Damping))
         .flag("--damping"),
-    entry("reedh", REED, "Reed H", number([1.0, 5.0], 2.598_076, 4, ""))
+    entry("reedh", REED, "Reed H", number([1.0, 5.0], H_INIT as f32, 4, ""))
         .help(
             "H: opening of the reed at rest, dimensionless; the reference is \u{221a}27/2",
             "A wider opening gives more flow. While k is coupled to H, the peak of the flow stays the same and the reed closes earlier.",
@@ -278,7 +279,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .sets(Sets::Number(SettingNumber::ReedH))
         .flag("--H")
         .midi(REED_MIDI),
-    entry("reedk", REED, "Reed k", number([0.1, 2.0], 0.384_900_18, 4, ""))
+    entry("reedk", REED, "Reed k", number([0.1, 2.0], K_INIT as f32, 4, ""))
         .help(
             "k: stiffness of the reed, dimensionless; the reference is 27/(4H\u{b3})",
             "A stiffer reed closes later, at H\u{b7}k. Has no effect while k is coupled to H.",

@@ -3,6 +3,8 @@
 //! The knob computes its torque from these; `docs/protocol.md` specifies the same fields as bytes. Ranges are compared in
 //! binary32, as the firmware does, so that both ends agree to the last bit.
 
+use crate::reed::law::{H_INIT, K_INIT};
+
 /// Most torque that any knob may make, mNm: the nominal force of the TorqueTuner, compiled into its firmware as well.
 pub const HARD_CEILING_MNM: u16 = 450;
 
@@ -109,8 +111,8 @@ impl Default for Feel {
             feel_id: 0,
             law: TorqueLaw::Free,
             morph_ms: 50,
-            h: 2.598_076,
-            k: 0.384_900_18,
+            h: H_INIT as f32,
+            k: K_INIT as f32,
             scale_mnm: 0.0,
             stretch: 1.0,
             offset_deg: 0.0,

@@ -13,7 +13,7 @@ use crate::instrument::reach::Reach;
 use crate::instrument::room::Room;
 use crate::instrument::techniques::{Techniques, Tract};
 use crate::reed::ReedLaw;
-use crate::reed::law::coupled_k;
+use crate::reed::law::{H_INIT, K_INIT, coupled_k};
 use crate::reed::physical::{P_REF_PA, PhysicalReed, ZETA_REFERENCE};
 use crate::reed::strength;
 use crate::units::fix;
@@ -154,8 +154,8 @@ impl Default for Settings {
             zeta: ZETA_REFERENCE as f32,
             damping: 1.0,
             lay: 0.4,
-            reed_h: 2.598_076,
-            reed_k: 0.384_900_18,
+            reed_h: H_INIT as f32,
+            reed_k: K_INIT as f32,
             coupled: true,
             reed_a: 1.0,
             a4_hz: 440.0,
@@ -437,7 +437,7 @@ mod tests {
         let refused = |reed: PhysicalReed| Settings::default().refused_reed(&reed, &reference).unwrap();
         let (symbol, h, [low, high]) = refused(PhysicalReed { tip_opening_m: 2e-3, ..reference });
         assert_eq!((symbol, low, high), ("H", 1.0, 5.0));
-        assert!((h - 4.0 * 2.598_076).abs() < 1e-4);
+        assert!((h - 4.0 * H_INIT).abs() < 1e-4);
         assert_eq!(refused(PhysicalReed { stiffness_n_m: 1e5, ..reference }).0, "k");
         assert_eq!(refused(PhysicalReed { width_m: 0.1, ..reference }).0, "zeta");
     }

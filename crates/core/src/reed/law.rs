@@ -149,6 +149,8 @@ mod tests {
     fn constants_are_the_notebooks() {
         assert_eq!(27.0_f64.sqrt() / 2.0, H_INIT);
         assert_eq!(27.0 / (H_INIT.powi(3) * 4.0), K_INIT);
+        // The firmware's own, in single precision.
+        assert_eq!((H_INIT as f32, K_INIT as f32), (2.598_076, 0.384_900_18));
         assert!((ReedLaw::default().closing() - 1.0).abs() < 1e-15);
     }
 
