@@ -252,7 +252,6 @@ fn radii_and_positions(
     pieces: &[(f64, f64)],
     edges: &[f64],
 ) -> (Vec<f64>, Vec<f64>) {
-    let wall = wall_loss::wall_constant(air);
     let mut exact = 0.0;
     pieces
         .iter()
@@ -264,7 +263,7 @@ fn radii_and_positions(
             }
             let radius_m = ((volume / inertance).sqrt() / std::f64::consts::PI).sqrt();
             let length = (volume * inertance).sqrt();
-            exact += length / air.c * (1.0 + wall * air.c * wall_loss::DELAY / radius_m) * 2.0 * rate_hz;
+            exact += length / air.c * (1.0 + wall_loss::slowing(air, radius_m)) * 2.0 * rate_hz;
             (radius_m, exact)
         })
         .unzip()

@@ -269,7 +269,6 @@ fn tuning(file: &InstrumentFile, notes: &[NoteCheck], others: &[Option<usize>]) 
 
 /// How long a wave takes from the tip to `x_m`, half samples, slowed by the walls as the lattice reckons.
 fn ticks_to(file: &InstrumentFile, x_m: f64, air: &Air) -> f64 {
-    let slow = wall_loss::wall_constant(air) * air.c * wall_loss::DELAY;
     let path: f64 = file
         .bore
         .iter()
@@ -280,7 +279,7 @@ fn ticks_to(file: &InstrumentFile, x_m: f64, air: &Air) -> f64 {
                 return 0.0;
             }
             let middle_m = file.radius_at(0.5 * (segment.x_start_m + end_m));
-            length_m * (1.0 + slow / middle_m)
+            length_m * (1.0 + wall_loss::slowing(air, middle_m))
         })
         .sum();
     path / air.c * 2.0 * GRID_HZ

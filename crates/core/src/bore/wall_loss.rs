@@ -15,7 +15,7 @@ pub const POLES_HZ: [f64; 3] = [26.10, 322.7, 2_563.8];
 /// Strengths c_k, s^-1/2.
 pub const STRENGTHS: [f64; 3] = [16.48, 29.31, 100.6];
 /// Weight c_inf of the extra delay, s^1/2.
-pub const DELAY: f64 = 2.46e-3;
+const DELAY: f64 = 2.46e-3;
 /// How much more than a smooth tube a wall with tone holes loses (fitted to the transfer matrices).
 pub const HOLED_WALL: f64 = 1.05;
 
@@ -23,6 +23,11 @@ pub const HOLED_WALL: f64 = 1.05;
 pub fn wall_constant(air: &Air) -> f64 {
     let prandtl = air.mu * air.cp / air.kappa;
     HOLED_WALL * (1.0 + (air.gamma - 1.0) / prandtl.sqrt()) * (air.mu / air.rho).sqrt() / air.c
+}
+
+/// By what share of its time the walls slow a wave in a tube of this radius: the extra delay of the root.
+pub fn slowing(air: &Air, radius_m: f64) -> f64 {
+    wall_constant(air) * air.c * DELAY / radius_m
 }
 
 /// Deals losses to cells: `losses[cell]` is `K_v L / r`, the result `A` of the cell's filter, whose pole is
