@@ -171,7 +171,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "",
         )
         .sets(Sets::Choice(|settings, at| {
-            settings.breath_response = nth(at, [BreathResponse::Played, BreathResponse::Physical]);
+            settings.breath_response = nth(at, BreathResponse::ALL);
         }))
         .flag("--breath-response"),
     entry("bcurve", BREATH, "Breath curve", number([0.5, 2.0], 1.0, 2, ""))
@@ -326,7 +326,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Natural: in tune at mezzo-forte; the pitch moves with the breath, as in a real bore. Tempered: in tune at every breath. Where the breath response is Played, the player also corrects what another reed, embouchure or lip does to the pitch. Where it is Physical, nobody corrects this, and notes are up to some 20 cents off.",
             "",
         )
-        .sets(Sets::Choice(|settings, at| settings.tuning = nth(at, [Tuning::Natural, Tuning::Tempered])))
+        .sets(Sets::Choice(|settings, at| settings.tuning = nth(at, Tuning::ALL)))
         .flag("--tempered"),
     entry("temp", TUNING, "Temperature", number([10.0, 40.0], 25.0, 1, " \u{b0}C"))
         .help(
@@ -357,7 +357,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Silent: nothing. Nearest octave: the same note in the nearest octave that the instrument has.",
             "",
         )
-        .sets(Sets::Choice(|settings, at| settings.reach.beyond = nth(at, [Beyond::Silent, Beyond::Octave]))),
+        .sets(Sets::Choice(|settings, at| settings.reach.beyond = nth(at, Beyond::ALL))),
     entry("noise", NOISE, "Breath noise", percent(0.3))
         .help("Noise of the breath in the reed channel", "Adds the sound of air.", "")
         .sets(Sets::Number(SettingNumber::Noise))
@@ -685,7 +685,7 @@ pub static PARAMETERS: &[Parameter] = &[
     )
     .sets(Sets::Choice(|settings, at| {
         settings.listening.mode =
-            nth(at, [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point]);
+            nth(at, ListeningMode::ALL);
     })),
     entry("ldist", LISTENING, "Listening distance", number([0.2, 10.0], 1.0, 2, " m"))
         .help(
@@ -803,7 +803,7 @@ pub static PARAMETERS: &[Parameter] = &[
         "",
     )
     .sets(Sets::Choice(|settings, at| {
-        settings.attack = nth(at, [Attack::Soft, Attack::Normal, Attack::Hard]);
+        settings.attack = nth(at, Attack::ALL);
     })),
     entry("gliss", EXPRESSION, "Glissando", number([0.0, 3.0], 0.0, 2, " s"))
         .help(
@@ -910,7 +910,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "",
         )
         .sets(Sets::Choice(|settings, at| {
-            settings.techniques.growl_pitch = nth(at, [GrowlPitch::Interval, GrowlPitch::Fixed]);
+            settings.techniques.growl_pitch = nth(at, GrowlPitch::ALL);
         })),
     entry("growli", TECHNIQUES, "Growl interval", number([-24.0, 12.0], -12.0, 1, " st"))
         .help(
@@ -977,7 +977,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "",
         )
         .sets(Sets::Choice(|settings, at| {
-            settings.players.split = nth(at, [Split::Chords, Split::Unison]);
+            settings.players.split = nth(at, Split::ALL);
         })),
     entry("spread", PLAYERS, "Spread", number([0.0, 25.0], 6.0, 1, " cents"))
         .help(

@@ -256,21 +256,9 @@ pub enum TuningChoice {
     Tempered,
 }
 
-impl From<Tuning> for TuningChoice {
-    fn from(tuning: Tuning) -> Self {
-        match tuning {
-            Tuning::Natural => Self::Natural,
-            Tuning::Tempered => Self::Tempered,
-        }
-    }
-}
-
 impl From<TuningChoice> for Tuning {
     fn from(choice: TuningChoice) -> Self {
-        match choice {
-            TuningChoice::Natural => Self::Natural,
-            TuningChoice::Tempered => Self::Tempered,
-        }
+        Self::ALL[choice.to_index()]
     }
 }
 
@@ -286,21 +274,9 @@ pub enum BeyondChoice {
     Octave,
 }
 
-impl From<Beyond> for BeyondChoice {
-    fn from(beyond: Beyond) -> Self {
-        match beyond {
-            Beyond::Silent => Self::Silent,
-            Beyond::Octave => Self::Octave,
-        }
-    }
-}
-
 impl From<BeyondChoice> for Beyond {
     fn from(choice: BeyondChoice) -> Self {
-        match choice {
-            BeyondChoice::Silent => Self::Silent,
-            BeyondChoice::Octave => Self::Octave,
-        }
+        Self::ALL[choice.to_index()]
     }
 }
 
@@ -315,21 +291,9 @@ pub enum ResponseChoice {
     Physical,
 }
 
-impl From<BreathResponse> for ResponseChoice {
-    fn from(response: BreathResponse) -> Self {
-        match response {
-            BreathResponse::Played => Self::Played,
-            BreathResponse::Physical => Self::Physical,
-        }
-    }
-}
-
 impl From<ResponseChoice> for BreathResponse {
     fn from(choice: ResponseChoice) -> Self {
-        match choice {
-            ResponseChoice::Played => Self::Played,
-            ResponseChoice::Physical => Self::Physical,
-        }
+        Self::ALL[choice.to_index()]
     }
 }
 
@@ -360,7 +324,7 @@ pub enum BreathFromChoice {
 
 impl From<BreathFromChoice> for BreathFrom {
     fn from(choice: BreathFromChoice) -> Self {
-        Self::ALL[choice as usize]
+        Self::ALL[choice.to_index()]
     }
 }
 
@@ -401,11 +365,11 @@ impl ChalumeauParams {
                 full: number("full"),
                 tongue: number("tongue"),
                 legato: number("legato"),
-                response: choice("resp", Settings::default().breath_response.into()),
+                response: choice("resp"),
                 curve: number("bcurve"),
                 softest: number("bsoft"),
                 loudest: number("bloud"),
-                from: choice("bfrom", BreathFromChoice::Any),
+                from: choice("bfrom"),
                 deadband: number("bdead"),
             },
             embouchure: EmbouchureParams {
@@ -423,11 +387,11 @@ impl ChalumeauParams {
             },
             tuning: TuningParams {
                 a4: number("a4"),
-                tuning: choice("tune", Settings::default().tuning.into()),
+                tuning: choice("tune"),
                 temperature: number("temp"),
                 vent_loss: number("vent"),
                 transpose: whole("transp"),
-                beyond: choice("beyond", Settings::default().reach.beyond.into()),
+                beyond: choice("beyond"),
             },
             noise: NoiseParams { noise: number("noise") },
             output: OutputParams { gain: number("gain"), panic: moment::switch(Moment::Panic, &moments) },

@@ -108,19 +108,16 @@ pub fn set(settings: &mut Settings, at: usize, value: f32) {
         return;
     }
     match at - NUMBERS.len() {
-        0 => settings.breath_response = nth([BreathResponse::Played, BreathResponse::Physical], value),
-        1 => settings.attack = nth([Attack::Soft, Attack::Normal, Attack::Hard], value),
+        0 => settings.breath_response = nth(BreathResponse::ALL, value),
+        1 => settings.attack = nth(Attack::ALL, value),
         2 => settings.coupled = value > 0.5,
-        3 => settings.tuning = nth([Tuning::Natural, Tuning::Tempered], value),
-        4 => {
-            let modes = [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point];
-            settings.listening.mode = nth(modes, value);
-        }
+        3 => settings.tuning = nth(Tuning::ALL, value),
+        4 => settings.listening.mode = nth(ListeningMode::ALL, value),
         5 => settings.reach.transpose = value as i32,
-        6 => settings.reach.beyond = nth([Beyond::Silent, Beyond::Octave], value),
-        7 => settings.techniques.growl_pitch = nth([GrowlPitch::Interval, GrowlPitch::Fixed], value),
+        6 => settings.reach.beyond = nth(Beyond::ALL, value),
+        7 => settings.techniques.growl_pitch = nth(GrowlPitch::ALL, value),
         8 => settings.players.count = value as i32,
-        9 => settings.players.split = nth([Split::Chords, Split::Unison], value),
+        9 => settings.players.split = nth(Split::ALL, value),
         10 => settings.alternates = value > 0.5,
         11 => settings.reach.key_switches = nth(KeySwitches::ALL, value),
         _ => {}

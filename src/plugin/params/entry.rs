@@ -61,12 +61,21 @@ pub(super) fn switch(id: &str) -> BoolParam {
     switch_from(id, |default| default)
 }
 
-/// A choice of the table. The framework takes texts and ids from the enum; a test holds them to the table.
-pub(super) fn choice<T: Enum + PartialEq + 'static>(id: &str, default: T) -> EnumParam<T> {
+/// A choice of the table; `start` may replace its default. The framework takes texts and ids from the enum; a test holds
+/// them to the table.
+pub(super) fn choice_from<T: Enum + PartialEq + 'static>(
+    id: &str,
+    start: impl FnOnce(T) -> T,
+) -> EnumParam<T> {
     let parameter = of(id);
-    let Kind::Choice(_) = parameter.kind else { wrong(id) };
-    let param = EnumParam::new(parameter.name, default);
+    let Kind::Choice(choice) = parameter.kind else { wrong(id) };
+    let param = EnumParam::new(parameter.name, start(T::from_index(choice.default)));
     if parameter.is_automatable { param } else { param.non_automatable() }
+}
+
+/// A choice of the table.
+pub(super) fn choice<T: Enum + PartialEq + 'static>(id: &str) -> EnumParam<T> {
+    choice_from(id, |default| default)
 }
 
 /// A read-only status: `text` is what it says.

@@ -7,7 +7,7 @@ use std::sync::{Arc, RwLock};
 
 use nice_plug::prelude::*;
 
-use super::entry::{choice, status, whole};
+use super::entry::{choice, choice_from, status, whole};
 use crate::plugin::launch_options::LaunchOptions;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::instrument::prepare::Quality;
@@ -128,11 +128,11 @@ impl InstrumentParams {
     /// Defaults; whoever loads the instrument writes its state to `state`.
     pub fn new(state: Arc<RwLock<String>>) -> Self {
         let named = LaunchOptions::get().and_then(|options| options.instrument.clone());
-        let (first, file) = named.unwrap_or((InstrumentChoice::BFlat, String::new()));
+        let (first, file) = named.map_or_else(Default::default, |(first, file)| (Some(first), file));
         Self {
             file: RwLock::new(file),
-            choice: choice("instr", first),
-            quality: choice("qual", QualityChoice::Live),
+            choice: choice_from("instr", |default| first.unwrap_or(default)),
+            quality: choice("qual"),
             bend_range: whole("bendr"),
             status: status("istat", state),
         }

@@ -41,23 +41,9 @@ pub enum ListeningChoice {
     Point,
 }
 
-impl From<ListeningMode> for ListeningChoice {
-    fn from(mode: ListeningMode) -> Self {
-        match mode {
-            ListeningMode::Everywhere => Self::Everywhere,
-            ListeningMode::Position => Self::Position,
-            ListeningMode::Point => Self::Point,
-        }
-    }
-}
-
 impl From<ListeningChoice> for ListeningMode {
     fn from(choice: ListeningChoice) -> Self {
-        match choice {
-            ListeningChoice::Everywhere => Self::Everywhere,
-            ListeningChoice::Position => Self::Position,
-            ListeningChoice::Point => Self::Point,
-        }
+        Self::ALL[choice.to_index()]
     }
 }
 
@@ -65,7 +51,7 @@ impl ListeningParams {
     /// The table's parameters; `number` makes one from its id.
     pub(super) fn new(number: &dyn Fn(&str) -> FloatParam) -> Self {
         Self {
-            mode: choice("heard", ListeningMode::default().into()),
+            mode: choice("heard"),
             distance: number("ldist"),
             angle: number("langle"),
             height: number("lheigh"),

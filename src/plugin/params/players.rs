@@ -34,21 +34,9 @@ pub enum SplitChoice {
     Unison,
 }
 
-impl From<Split> for SplitChoice {
-    fn from(split: Split) -> Self {
-        match split {
-            Split::Chords => Self::Chords,
-            Split::Unison => Self::Unison,
-        }
-    }
-}
-
 impl From<SplitChoice> for Split {
     fn from(choice: SplitChoice) -> Self {
-        match choice {
-            SplitChoice::Chords => Self::Chords,
-            SplitChoice::Unison => Self::Unison,
-        }
+        Self::ALL[choice.to_index()]
     }
 }
 
@@ -57,7 +45,7 @@ impl PlayersParams {
     pub(super) fn new(number: &dyn Fn(&str) -> FloatParam) -> Self {
         Self {
             count: whole("player"),
-            split: choice("split", Players::default().split.into()),
+            split: choice("split"),
             spread: number("spread"),
             seats: number("seats"),
         }

@@ -42,7 +42,7 @@ pub struct PhysicalReedParams {
 impl Default for PhysicalReedParams {
     fn default() -> Self {
         Self {
-            face: choice("rface", ReedFace::Dimensionless),
+            face: choice("rface"),
             stiffness: number("rstiff"),
             area: number("rarea"),
             width: number("rwidth"),

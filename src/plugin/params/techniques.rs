@@ -6,10 +6,10 @@ use super::entry::{choice, switch};
 use super::settled;
 use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::control::midi::techniques::Wheel;
+use chalumeau_core::instrument::Articulation;
 use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::vibrato::Vibrato;
 use chalumeau_core::instrument::techniques::{GrowlPitch, Techniques, Tract};
-use chalumeau_core::instrument::{Articulation, Settings};
 
 /// How notes begin, go on and lead into each other.
 #[derive(Params)]
@@ -113,23 +113,9 @@ pub enum AttackChoice {
     Hard,
 }
 
-impl From<Attack> for AttackChoice {
-    fn from(attack: Attack) -> Self {
-        match attack {
-            Attack::Soft => Self::Soft,
-            Attack::Normal => Self::Normal,
-            Attack::Hard => Self::Hard,
-        }
-    }
-}
-
 impl From<AttackChoice> for Attack {
     fn from(choice: AttackChoice) -> Self {
-        match choice {
-            AttackChoice::Soft => Self::Soft,
-            AttackChoice::Normal => Self::Normal,
-            AttackChoice::Hard => Self::Hard,
-        }
+        Self::ALL[choice.to_index()]
     }
 }
 
@@ -145,21 +131,9 @@ pub enum GrowlPitchChoice {
     Fixed,
 }
 
-impl From<GrowlPitch> for GrowlPitchChoice {
-    fn from(pitch: GrowlPitch) -> Self {
-        match pitch {
-            GrowlPitch::Interval => Self::Interval,
-            GrowlPitch::Fixed => Self::Fixed,
-        }
-    }
-}
-
 impl From<GrowlPitchChoice> for GrowlPitch {
     fn from(choice: GrowlPitchChoice) -> Self {
-        match choice {
-            GrowlPitchChoice::Interval => Self::Interval,
-            GrowlPitchChoice::Fixed => Self::Fixed,
-        }
+        Self::ALL[choice.to_index()]
     }
 }
 
@@ -220,9 +194,9 @@ impl ExpressionParams {
             vibrato_rate: number("vibhz"),
             vibrato_onset: number("vibon"),
             vibrato_unevenness: number("vibun"),
-            attack: choice("attack", Settings::default().attack.into()),
+            attack: choice("attack"),
             glissando: number("gliss"),
-            wheel: choice("wheel", WheelChoice::Vibrato),
+            wheel: choice("wheel"),
             scoop: number("scoop"),
             scoop_time: number("scoops"),
             fall: number("fall"),
@@ -231,7 +205,7 @@ impl ExpressionParams {
             key_sounds: number("ksound"),
             slap: number("slap"),
             alternates: switch("altf"),
-            key_switches: choice("keysw", KeySwitchesChoice::Off),
+            key_switches: choice("keysw"),
         }
     }
 
@@ -266,7 +240,7 @@ impl TechniqueParams {
     pub(super) fn new(number: &dyn Fn(&str) -> FloatParam) -> Self {
         Self {
             growl: number("growl"),
-            growl_pitch: choice("growlp", GrowlPitch::default().into()),
+            growl_pitch: choice("growlp"),
             growl_interval: number("growli"),
             growl_frequency: number("growlf"),
             flutter: number("flut"),

@@ -1,11 +1,17 @@
 //! The framework's parameters are those of the table.
 
 use std::collections::BTreeMap;
+use std::fmt::Debug;
+
+use chalumeau_core::control::key_switches::KeySwitches;
+use chalumeau_core::instrument::{Attack, GrowlPitch, ListeningMode, Split};
 
 use super::instrument::{InstrumentChoice, QualityChoice};
 use super::knob::{KnobKind, LawChoice, OrderChoice};
 use super::listening::ListeningChoice;
+use super::players::SplitChoice;
 use super::reed::ReedFace;
+use super::techniques::{AttackChoice, GrowlPitchChoice, KeySwitchesChoice, WheelChoice};
 use super::*;
 use crate::parameters::{Choice, Kind, PARAMETERS, Sets, Value, find};
 
@@ -34,24 +40,56 @@ fn hosts_see_the_table() {
 
 #[test]
 fn choices_have_the_ids_and_texts_of_the_table() {
-    fn same<T: Enum>(id: &str) {
+    fn same<T: Enum>(id: &'static str) -> &'static str {
         let Some(Kind::Choice(Choice { all, .. })) = find(id).map(|p| p.kind) else {
             panic!("{id} is no choice")
         };
         assert_eq!(T::variants(), all.iter().map(|(_, text)| *text).collect::<Vec<_>>(), "{id}");
         assert_eq!(T::ids().unwrap(), all.iter().map(|(id, _)| *id).collect::<Vec<_>>(), "{id}");
+        id
     }
-    same::<TuningChoice>("tune");
-    same::<ResponseChoice>("resp");
-    same::<KnobKind>("knob");
-    same::<LawChoice>("law");
-    same::<OrderChoice>("order");
-    same::<ReedSource>("hsrc");
-    same::<ReedSource>("ksrc");
-    same::<InstrumentChoice>("instr");
-    same::<QualityChoice>("qual");
-    same::<ReedFace>("rface");
-    same::<ListeningChoice>("heard");
+    // In the order of the table, and none is missing.
+    let held = [
+        same::<ResponseChoice>("resp"),
+        same::<BreathFromChoice>("bfrom"),
+        same::<TuningChoice>("tune"),
+        same::<BeyondChoice>("beyond"),
+        same::<KnobKind>("knob"),
+        same::<LawChoice>("law"),
+        same::<OrderChoice>("order"),
+        same::<ReedSource>("hsrc"),
+        same::<ReedSource>("ksrc"),
+        same::<InstrumentChoice>("instr"),
+        same::<QualityChoice>("qual"),
+        same::<ReedFace>("rface"),
+        same::<ListeningChoice>("heard"),
+        same::<AttackChoice>("attack"),
+        same::<WheelChoice>("wheel"),
+        same::<KeySwitchesChoice>("keysw"),
+        same::<GrowlPitchChoice>("growlp"),
+        same::<SplitChoice>("split"),
+    ];
+    let choices = PARAMETERS.iter().filter(|p| matches!(p.kind, Kind::Choice(_)));
+    assert_eq!(held.to_vec(), choices.map(|p| p.id).collect::<Vec<_>>());
+}
+
+/// The instrument's own choices stand in the same order.
+#[test]
+fn each_choice_is_the_one_of_its_name() {
+    fn same<T: Enum + Debug + Into<U>, U: Debug>() {
+        for index in 0..T::variants().len() {
+            let name = format!("{:?}", T::from_index(index));
+            assert_eq!(format!("{:?}", T::from_index(index).into()), name);
+        }
+    }
+    same::<TuningChoice, Tuning>();
+    same::<BeyondChoice, Beyond>();
+    same::<ResponseChoice, BreathResponse>();
+    same::<ListeningChoice, ListeningMode>();
+    same::<SplitChoice, Split>();
+    same::<AttackChoice, Attack>();
+    same::<GrowlPitchChoice, GrowlPitch>();
+    same::<KeySwitchesChoice, KeySwitches>();
 }
 
 #[test]

@@ -56,6 +56,11 @@ pub enum ListeningMode {
     Point,
 }
 
+impl ListeningMode {
+    /// All, in the order of the parameter that chooses one.
+    pub const ALL: [Self; 3] = [Self::Everywhere, Self::Position, Self::Point];
+}
+
 /// Where the instrument is heard from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Listening {

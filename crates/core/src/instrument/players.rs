@@ -16,6 +16,11 @@ pub enum Split {
     Unison,
 }
 
+impl Split {
+    /// All, in the order of the parameter that chooses one.
+    pub const ALL: [Self; 2] = [Self::Chords, Self::Unison];
+}
+
 /// The players of an [`Ensemble`](super::Ensemble).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Players {

@@ -21,6 +21,11 @@ pub enum Beyond {
     Octave,
 }
 
+impl Beyond {
+    /// All, in the order of the parameter that chooses one.
+    pub const ALL: [Self; 2] = [Self::Silent, Self::Octave];
+}
+
 /// Which note each key plays, for what follows the keys of a player and is none: a knob, a measurement.
 ///
 /// ```

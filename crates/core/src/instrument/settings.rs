@@ -32,6 +32,11 @@ pub enum BreathResponse {
     Physical,
 }
 
+impl BreathResponse {
+    /// All, in the order of the parameter that chooses one.
+    pub const ALL: [Self; 2] = [Self::Played, Self::Physical];
+}
+
 /// How the tuning delay follows the breath.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tuning {
@@ -41,6 +46,11 @@ pub enum Tuning {
     /// breath is [physical](BreathResponse::Physical).
     #[default]
     Tempered,
+}
+
+impl Tuning {
+    /// All, in the order of the parameter that chooses one.
+    pub const ALL: [Self; 2] = [Self::Natural, Self::Tempered];
 }
 
 /// Everything that can be set while playing. `Default` is the reference clarinet as a player plays it;

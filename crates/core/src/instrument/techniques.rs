@@ -12,6 +12,11 @@ pub enum GrowlPitch {
     Fixed,
 }
 
+impl GrowlPitch {
+    /// All, in the order of the parameter that chooses one.
+    pub const ALL: [Self; 2] = [Self::Interval, Self::Fixed];
+}
+
 /// Extended techniques.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Techniques {

@@ -19,6 +19,11 @@ pub enum Attack {
     Hard,
 }
 
+impl Attack {
+    /// All, in the order of the parameter that chooses one.
+    pub const ALL: [Self; 3] = [Self::Soft, Self::Normal, Self::Hard];
+}
+
 /// Soft: the share of the dynamic that the beginning lacks, and the time constant with which it comes, s: chosen for the delays of
 /// recorded partials, see `docs/tone.md`.
 const SOFT: (f64, f64) = (0.3, 0.18);
