@@ -67,9 +67,14 @@ const fn number([min, max]: [f32; 2], default: f32, digits: usize, unit: &'stati
     Kind::Number(Number { min, max, default, digits, unit, scale: 1.0 })
 }
 
+/// Part of 1, shown in percent.
+const fn share([min, max]: [f32; 2], default: f32) -> Kind {
+    Kind::Number(Number { min, max, default, digits: 1, unit: " %", scale: 100.0 })
+}
+
 /// 0 to 1, shown as 0 to 100 %.
 const fn percent(default: f32) -> Kind {
-    Kind::Number(Number { min: 0.0, max: 1.0, default, digits: 1, unit: " %", scale: 100.0 })
+    share([0.0, 1.0], default)
 }
 
 const fn whole([min, max]: [i32; 2], default: i32, unit: &'static str) -> Kind {
@@ -78,7 +83,11 @@ const fn whole([min, max]: [i32; 2], default: i32, unit: &'static str) -> Kind {
 
 /// The first is the default.
 const fn choice(all: &'static [(&'static str, &'static str)]) -> Kind {
-    Kind::Choice(Choice { all, default: 0 })
+    choice_of(all, 0)
+}
+
+const fn choice_of(all: &'static [(&'static str, &'static str)], default: usize) -> Kind {
+    Kind::Choice(Choice { all, default })
 }
 
 const fn switch(default: bool, [off, on]: [&'static str; 2]) -> Kind {
@@ -170,9 +179,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Played: the dynamic. Every note begins at a breath of 4 of 127, equal steps of breath are equal steps of level, and the lip follows as a player's does. Physical: the mouth pressure, in a straight line, on a lip that stays. Projects from before this choice are physical.",
             "",
         )
-        .sets(Sets::Choice(|settings, at| {
-            settings.breath_response = nth(at, BreathResponse::ALL);
-        }))
+        .sets(Sets::Choice(|settings, at| settings.breath_response = nth(at, BreathResponse::ALL)))
         .flag("--breath-response"),
     entry("bcurve", BREATH, "Breath curve", number([0.5, 2.0], 1.0, 2, ""))
         .help(
@@ -182,14 +189,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::BreathCurve))
         .flag("--breath-curve"),
-    entry("bsoft", BREATH, "Softest breath", Kind::Number(Number {
-        min: 0.0,
-        max: 0.5,
-        default: ONSET as f32,
-        digits: 1,
-        unit: " %",
-        scale: 100.0,
-    }))
+    entry("bsoft", BREATH, "Softest breath", share([0.0, 0.5], ONSET as f32))
         .help(
             "Breath at which notes begin, where the breath response is played",
             "Set it to what your controller sends when you blow as softly as you can. *Calibrate* does so.",
@@ -197,14 +197,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::BreathSoftest))
         .flag("--breath-softest"),
-    entry("bloud", BREATH, "Loudest breath", Kind::Number(Number {
-        min: 0.1,
-        max: 1.0,
-        default: 1.0,
-        digits: 1,
-        unit: " %",
-        scale: 100.0,
-    }))
+    entry("bloud", BREATH, "Loudest breath", share([0.1, 1.0], 1.0))
         .help(
             "Breath that plays fortissimo, where the breath response is played",
             "Set it to what your controller sends when you blow as hard as you like to. *Calibrate* does so.",
@@ -223,14 +216,7 @@ pub static PARAMETERS: &[Parameter] = &[
         "Any: whichever moves; CC2 overrides CC11, and CC11 overrides channel pressure. Pressure under a held key adds to its velocity; with Pressure it blows. Keys: the velocity, whatever controllers do. Automation of *Breath*, note expressions, linked controllers and the knob blow in any case.",
         "",
     ),
-    entry("bdead", BREATH, "Breath deadband", Kind::Number(Number {
-        min: 0.0,
-        max: 0.1,
-        default: 0.0,
-        digits: 1,
-        unit: " %",
-        scale: 100.0,
-    }))
+    entry("bdead", BREATH, "Breath deadband", share([0.0, 0.1], 0.0))
         .help(
             "Width of the band of breath within which a restless controller moves nothing",
             "Widen it if a held note trembles although you blow steadily.",
@@ -319,7 +305,7 @@ pub static PARAMETERS: &[Parameter] = &[
         "tune",
         TUNING,
         "Tuning",
-        Kind::Choice(Choice { all: &[("nat", "Natural"), ("temp", "Tempered")], default: 1 }),
+        choice_of(&[("nat", "Natural"), ("temp", "Tempered")], 1),
     )
         .help(
             "How notes are held in tune",
@@ -683,10 +669,7 @@ pub static PARAMETERS: &[Parameter] = &[
         "Bell and open holes each send out sound. Everywhere is the mean over all directions, the same in both channels. Position is one place or two. One point is as if all sound came from one hole: above 1 kHz too soft.",
         "",
     )
-    .sets(Sets::Choice(|settings, at| {
-        settings.listening.mode =
-            nth(at, ListeningMode::ALL);
-    })),
+    .sets(Sets::Choice(|settings, at| settings.listening.mode = nth(at, ListeningMode::ALL))),
     entry("ldist", LISTENING, "Listening distance", number([0.2, 10.0], 1.0, 2, " m"))
         .help(
             "Distance from the middle of the instrument, for Position",
@@ -792,19 +775,14 @@ pub static PARAMETERS: &[Parameter] = &[
         "attack",
         EXPRESSION,
         "Attack",
-        Kind::Choice(Choice {
-            all: &[("soft", "Soft"), ("normal", "Normal"), ("hard", "Hard")],
-            default: 1,
-        }),
+        choice_of(&[("soft", "Soft"), ("normal", "Normal"), ("hard", "Hard")], 1),
     )
     .help(
         "How breath and lip begin a note",
         "Soft: the partials come one after another, the high ones last. Normal: as the tongue lets go. Hard: with an accent.",
         "",
     )
-    .sets(Sets::Choice(|settings, at| {
-        settings.attack = nth(at, Attack::ALL);
-    })),
+    .sets(Sets::Choice(|settings, at| settings.attack = nth(at, Attack::ALL))),
     entry("gliss", EXPRESSION, "Glissando", number([0.0, 3.0], 0.0, 2, " s"))
         .help(
             "Time that a slur slides from note to note; at 0 the fingers move at once",
@@ -909,9 +887,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Follows the note: an interval to it, *Growl interval*. Fixed: *Growl frequency*.",
             "",
         )
-        .sets(Sets::Choice(|settings, at| {
-            settings.techniques.growl_pitch = nth(at, GrowlPitch::ALL);
-        })),
+        .sets(Sets::Choice(|settings, at| settings.techniques.growl_pitch = nth(at, GrowlPitch::ALL))),
     entry("growli", TECHNIQUES, "Growl interval", number([-24.0, 12.0], -12.0, 1, " st"))
         .help(
             "Interval of the voice from the note",
@@ -976,9 +952,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Chords: keys that are held together are played by different players. Unison: all play every note.",
             "",
         )
-        .sets(Sets::Choice(|settings, at| {
-            settings.players.split = nth(at, Split::ALL);
-        })),
+        .sets(Sets::Choice(|settings, at| settings.players.split = nth(at, Split::ALL))),
     entry("spread", PLAYERS, "Spread", number([0.0, 25.0], 6.0, 1, " cents"))
         .help(
             "How far the players are out of tune with the first, at most, either way",
