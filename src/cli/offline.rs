@@ -6,7 +6,6 @@
 use crate::cli::batch::plan::Plan;
 use crate::cli::bifurcation::refuse_silent;
 use crate::cli::haptic::{FeltReedArgs, ReedInAirArgs};
-use crate::cli::idle_settings;
 use crate::cli::parse;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, rate, sounding};
@@ -86,11 +85,7 @@ pub fn render_job(
     stop: Option<Stop>,
 ) -> Result<RenderJob, String> {
     let args = rendering(pairs, instrument, given, stop)?;
-    let said = |failure: crate::cli::Failure| failure.to_string();
-    let idle = idle_settings::in_words(&args.check().map_err(said)?);
-    let mut job = args.prepare().map_err(said)?;
-    job.idle = idle;
-    Ok(job)
+    args.prepare().map_err(|failure| failure.to_string())
 }
 
 /// Whether all that can be known of a rendering without preparing its instrument is in order: its notes, values and files.

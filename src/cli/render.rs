@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::CsvTable;
 use crate::cli::files::{self, MaybeFile};
-use crate::cli::idle_settings::{self, Idle};
+use crate::cli::idle_settings::Idle;
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::RenderMonitor;
@@ -106,13 +106,15 @@ pub struct Rendered {
     pub level: Levels,
     /// How often the calculation broke down.
     pub resets: u64,
+    /// Which given settings have no effect.
+    pub idle: Option<String>,
 }
 
 impl RenderCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let rendered = self.render(progress)?;
         self.report(&rendered);
-        if let Some(idle) = idle_settings::in_words(&self.play.check().unwrap_or_default()) {
+        if let Some(idle) = &rendered.idle {
             say!("warning: {idle}");
         }
         if let Some(late) = self.play.too_little_breath() {
@@ -195,7 +197,8 @@ impl RenderCommand {
             plot.draw(|| watched.figure(&self.play.title(), about))?;
         }
         out.keep()?;
-        Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, channels, level, resets })
+        let (seconds, rate) = (score.seconds(*rate), *rate);
+        Ok(Rendered { seconds, rate, channels, level, resets, idle: prepared.idle })
     }
 
     /// Whether all that can be known without preparing the instrument is in order. Gives back the settings that have no effect.
@@ -239,7 +242,7 @@ impl RenderCommand {
         [Some(&self.out), self.probe.as_deref(), self.plot.path()]
     }
 
-    fn report(&self, &Rendered { seconds, rate, channels, level, resets }: &Rendered) {
+    fn report(&self, &Rendered { seconds, rate, channels, level, resets, .. }: &Rendered) {
         let bits = match self.bits {
             Bits::Int16 => "16 bit",
             Bits::Int24 => "24 bit",

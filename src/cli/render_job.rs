@@ -28,7 +28,7 @@ pub struct RenderJob {
     pub rate: u32,
     /// What the user should know before it plays: notes that stay silent.
     pub warnings: Vec<String>,
-    /// Which given settings have no effect, if the caller wants to know.
+    /// Which given settings have no effect.
     pub idle: Option<String>,
 }
 

@@ -7,7 +7,7 @@ use crate::cli::Failure;
 use crate::cli::controllers::{GivenMap, named_or_file, only_in_the_plugin, set_by_map};
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::files::MaybeFile;
-use crate::cli::idle_settings::Idle;
+use crate::cli::idle_settings::{self, Idle};
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
@@ -208,7 +208,7 @@ impl ScoreArgs {
 
     /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
     pub fn prepare(&self) -> Result<RenderJob, Failure> {
-        let Planned { file, settings, mut parts, unplayed, keys, trims, take, mut warnings, .. } =
+        let Planned { file, settings, mut parts, unplayed, keys, trims, take, mut warnings, idle } =
             self.plan()?;
         let mut model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         if let Some(keys) = keys {
@@ -234,7 +234,7 @@ impl ScoreArgs {
             parts,
             rate: self.rate,
             warnings,
-            idle: None,
+            idle: idle_settings::in_words(&idle),
         })
     }
 
