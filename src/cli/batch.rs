@@ -7,6 +7,7 @@ pub(super) mod plan;
 use crate::cli::csv_table::{CsvTable, quoted};
 use crate::cli::files;
 use crate::cli::idle_settings::{self, Idle};
+use crate::cli::progress_bar::bar;
 use crate::cli::render::{LIMITED, RenderCommand, Rendered};
 use crate::cli::shared_args::counted;
 use crate::cli::words::typed;
@@ -14,7 +15,7 @@ use crate::cli::{Failure, parse};
 use chalumeau_core::instrument::side_by_side;
 use clap::{Args, Parser};
 use earlier::Earlier;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use inputs::{INPUTS, Inputs};
 use plan::{Plan, Variation};
 use std::fs;
@@ -306,7 +307,7 @@ fn render_left(
     let mut left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
     // Those of one bore one after another: only they play side by side.
     left.sort_by(|&one, &other| jobs[one].bore.cmp(&jobs[other].bore));
-    let bar = progress(left.len());
+    let bar = bar(left.len(), "{bar:40} {pos} of {len}  {elapsed} (left: {eta})");
     let (journal, failed) = (Mutex::new(journal), Mutex::new(None));
     let doubtful = Mutex::new(Doubtful::default());
     let made = side_by_side::each(
@@ -367,15 +368,6 @@ fn in_one_line(error: &clap::Error) -> String {
 fn finished(begin: &str, made: &Rendered) -> String {
     let db = |x: f32| if x > 0.0 { format!("{:.2}", 20.0 * x.log10()) } else { "-inf".to_owned() };
     format!("{begin},{:.4},{},{},{}", made.seconds, made.rate, db(made.level.peak), db(made.level.rms))
-}
-
-/// A progress bar over files; it shows on a terminal only.
-fn progress(files: usize) -> ProgressBar {
-    let bar = ProgressBar::new(files as u64);
-    match ProgressStyle::with_template("{bar:40} {pos} of {len}  {elapsed} (left: {eta})") {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
 use crate::cli::plot_args::PlotArgs;
-use crate::cli::render::progress;
+use crate::cli::progress_bar::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, note, rate, sounding, within};
 use crate::cli::silent_keys::silent_keys;

@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{CsvTable, TableArgs, number};
 use crate::cli::plot_args::PlotArgs;
-use crate::cli::render::progress;
+use crate::cli::progress_bar::progress;
 use crate::cli::score_args::preset_called;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, dynamic, within};

@@ -3,8 +3,8 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
 use crate::cli::files;
+use crate::cli::progress_bar::progress;
 use crate::cli::reed_physical::{self, PhysicalReedArgs};
-use crate::cli::render::progress;
 use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
 use crate::picture_file::PictureFile;
 use chalumeau_core::instrument::Settings;

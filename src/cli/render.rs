@@ -5,6 +5,7 @@ use crate::cli::csv_table::CsvTable;
 use crate::cli::files::{self, MaybeFile};
 use crate::cli::idle_settings::Idle;
 use crate::cli::plot_args::PlotArgs;
+use crate::cli::progress_bar::progress;
 use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::RenderMonitor;
 use crate::cli::score_args::ScoreArgs;
@@ -16,7 +17,7 @@ use chalumeau_core::instrument::Probe;
 use chalumeau_core::instrument::side_by_side::{self, Stand};
 use chalumeau_core::reed::physical::P_REF_PA;
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use std::cell::RefCell;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -280,15 +281,6 @@ pub fn about(prepared: &RenderJob) -> Vec<String> {
         settings.zeta,
         1e-3 * settings.closing_pa()
     )]
-}
-
-/// A progress bar; it shows on a terminal only.
-pub fn progress(samples: usize) -> ProgressBar {
-    let bar = ProgressBar::new(samples as u64);
-    match ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} (left: {eta})") {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
 }
 
 /// The table of internal signals.

@@ -5,7 +5,8 @@ mod tour;
 
 use crate::cli::Failure;
 use crate::cli::files;
-use crate::cli::render::{about, progress};
+use crate::cli::progress_bar::progress;
+use crate::cli::render::about;
 use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::{RenderMonitor, RenderSummary};
 use crate::cli::report::breath_and_haptics::BreathAndHaptics;

@@ -3,6 +3,7 @@
 use crate::cache::{Cache, VARIABLE};
 use crate::cli::Failure;
 use crate::cli::files::MaybeFile;
+use crate::cli::progress_bar;
 use crate::instrument_path::{self, LoadError};
 use crate::presets::Preset;
 use chalumeau_core::bore::bundled::Bundled;
@@ -16,7 +17,6 @@ use chalumeau_core::instrument::{BuildError, Model, Quality, Wanted};
 use chalumeau_core::score::ScoreError;
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote, midi_of_name};
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, Once};
@@ -125,7 +125,8 @@ impl InstrumentArg {
         let mut bar = None;
         let cache = Cache::system().map(WarningCache);
         let made = make(cache.as_ref().map(|cache| cache as &dyn Store), &mut |progress| {
-            let bar = bar.get_or_insert_with(preparing);
+            let bar = bar
+                .get_or_insert_with(|| progress_bar::bar(1_000, "{msg} {bar:40} {percent:>3} %  {elapsed}"));
             let (doing, share) = match progress {
                 Progress::Fitting(share) => ("fitting the bore", share),
                 Progress::Fitted(_) => ("fitting the bore", 1.0),
@@ -193,15 +194,6 @@ fn keep(wanted: &Wanted, model: &Arc<Model>) {
             all.remove(0);
         }
         all.push((wanted.clone(), model.clone()));
-    }
-}
-
-/// A progress bar; it shows on a terminal only.
-fn preparing() -> ProgressBar {
-    let bar = ProgressBar::new(1_000);
-    match ProgressStyle::with_template("{msg} {bar:40} {percent:>3} %  {elapsed}") {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
     }
 }
 
