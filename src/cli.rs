@@ -31,6 +31,7 @@ pub mod offline;
 mod parameters;
 mod plot_args;
 mod presets;
+mod progress_bar;
 mod radiation;
 mod realism;
 mod reed;

@@ -27,6 +27,7 @@ use crate::parameters::{self, Kind, PARAMETERS, Parameter, Sets, Value};
 use crate::presets::nearest;
 use chalumeau_core::control::midi::links::{Link, MOST, Source, Target};
 use chalumeau_core::instrument::Settings;
+use chalumeau_core::units::clamped_or;
 
 /// Layout of the text.
 const FORMAT: i64 = 1;
@@ -136,12 +137,11 @@ impl ParameterLink {
     /// Every number as it may be: inside the parameter's range, finite.
     pub fn mended(self) -> Self {
         let Kind::Number(number) = self.parameter.kind else { return self };
-        let inside =
-            |x: f32, default: f32| if x.is_finite() { x.clamp(number.min, number.max) } else { default };
+        let inside = |x: f32, default: f32| clamped_or(x, number.min, number.max, default);
         Self {
             low: inside(self.low, number.min),
             high: inside(self.high, number.max),
-            curve: if self.curve.is_finite() { self.curve.clamp(CURVES.0, CURVES.1) } else { 1.0 },
+            curve: clamped_or(self.curve, CURVES.0, CURVES.1, 1.0),
             ..self
         }
     }

@@ -8,6 +8,7 @@ use egui_plot::{
 
 use crate::editor::theme;
 use crate::editor::theme::Colours;
+use chalumeau_core::units::clamped_or;
 
 /// Height of the line above a picture, points.
 const NAME_HEIGHT: f32 = 14.0;
@@ -216,7 +217,7 @@ pub fn legend_below(ui: &Ui, transform: &PlotTransform, from: egui::Pos2, lines:
 
 /// A number from outside as a share 0..=1; 0 if it is not finite.
 pub fn share(value: f32) -> f32 {
-    if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 }
+    clamped_or(value, 0.0, 1.0, 0.0)
 }
 
 /// A text where there is nothing to draw yet.

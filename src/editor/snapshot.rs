@@ -18,7 +18,7 @@ use chalumeau_core::event::Fingerings;
 use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
 use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::instrument::{KeyPitches, Settings};
-use chalumeau_core::units::{SoundingNote, WrittenNote};
+use chalumeau_core::units::{SoundingNote, WrittenNote, clamped_or};
 
 /// Less mouth pressure than this is no breath, kPa.
 pub const NO_BREATH_KPA: f32 = 0.02;
@@ -171,7 +171,7 @@ impl Snapshot {
 
     /// Mouth pressure, kPa, limited to 0..=100.
     pub fn mouth_now_kpa(&self) -> f32 {
-        if self.mouth_kpa.is_finite() { self.mouth_kpa.clamp(0.0, 100.0) } else { 0.0 }
+        clamped_or(self.mouth_kpa, 0.0, 100.0, 0.0)
     }
 
     /// The fingering in place.

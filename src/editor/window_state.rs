@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::editor::Tab;
 use crate::editor::note_names::NoteNames;
+use chalumeau_core::units::clamped_or;
 
 /// Size the window opens with, points.
 pub const SIZE: (f32, f32) = (1100.0, 720.0);
@@ -57,9 +58,7 @@ impl WindowState {
     /// The same, with every value inside its range.
     pub fn mended(self) -> Self {
         let d = Self::default();
-        let fix = |x: f32, (low, high): (f32, f32), default| {
-            if x.is_finite() { x.clamp(low, high) } else { default }
-        };
+        let fix = |x: f32, (low, high): (f32, f32), default| clamped_or(x, low, high, default);
         Self {
             size: (
                 fix(self.size.0, (LEAST_SIZE.0, 8_000.0), d.size.0),

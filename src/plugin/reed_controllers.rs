@@ -12,6 +12,7 @@ use super::params::knob::ReedSource;
 use chalumeau_core::control::notes::HeldNote;
 use chalumeau_core::event::Event;
 use chalumeau_core::maths;
+use chalumeau_core::units::clamped_or;
 
 /// Factor at full travel.
 const FULL_FACTOR: f32 = 1.6;
@@ -58,7 +59,7 @@ impl ReedControllers {
 
     /// A controller moves.
     pub fn set(&mut self, (at, value): (usize, f32)) {
-        self.values[at] = Some(if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 });
+        self.values[at] = Some(clamped_or(value, 0.0, 1.0, 0.0));
     }
 
     /// Takes the values that another has heard.

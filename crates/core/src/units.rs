@@ -154,7 +154,7 @@ pub fn cents(to_hz: f64, from_hz: f64) -> f64 {
 }
 
 /// A number inside its range; one that is not finite becomes the default. Real-time safe.
-pub fn fix(x: f32, low: f32, high: f32, default: f32) -> f32 {
+pub fn clamped_or(x: f32, low: f32, high: f32, default: f32) -> f32 {
     if x.is_finite() { x.clamp(low, high) } else { default }
 }
 

@@ -6,6 +6,8 @@
 //!
 //! Source: CLAP 1.2, `events.h`: how note events name notes, and what a host wants to hear about their ends.
 
+use crate::units::clamped_or;
+
 /// Notes that can be held at once, as many as [`Keys`](super::keys::Keys); more push the oldest out.
 pub const MOST: usize = crate::control::keys::MOST;
 
@@ -98,14 +100,14 @@ impl HeldNote {
     }
 
     fn express(&mut self, expression: NoteExpression) {
-        let unit = |value: f32| if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 };
+        let unit = |value: f32| clamped_or(value, 0.0, 1.0, 0.0);
         match expression {
             NoteExpression::Tuning(cents) => self.tuning_cents = if cents.is_finite() { cents } else { 0.0 },
             NoteExpression::Breath(breath) => self.breath = Some(unit(breath)),
             NoteExpression::Volume(gain) => {
-                self.gain = if gain.is_finite() { gain.clamp(0.0, 4.0) } else { 1.0 };
+                self.gain = clamped_or(gain, 0.0, 4.0, 1.0);
             }
-            NoteExpression::Pan(pan) => self.pan = if pan.is_finite() { pan.clamp(-1.0, 1.0) } else { 0.0 },
+            NoteExpression::Pan(pan) => self.pan = clamped_or(pan, -1.0, 1.0, 0.0),
             NoteExpression::Brightness(brightness) => self.brightness = Some(unit(brightness)),
             NoteExpression::Press(press) => self.press = Some(unit(press)),
         }

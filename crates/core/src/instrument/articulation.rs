@@ -1,7 +1,7 @@
 //! How a note begins and ends beside breath and tongue, and what is heard of the player's breath and of the keys: plain numbers,
 //! all off at first.
 
-use crate::units::fix;
+use crate::units::clamped_or;
 
 /// Most that a breath in adds to the time until silence, s.
 const BREATH_IN_S: f64 = 1.0;
@@ -47,13 +47,13 @@ impl Articulation {
     pub(super) fn clamped(self) -> Self {
         let d = Self::default();
         Self {
-            scoop_cents: fix(self.scoop_cents, 0.0, 300.0, d.scoop_cents),
-            scoop_s: fix(self.scoop_s, 0.02, 1.0, d.scoop_s),
-            fall_cents: fix(self.fall_cents, 0.0, 1_200.0, d.fall_cents),
-            fall_s: fix(self.fall_s, 0.05, 2.0, d.fall_s),
-            breath_in: fix(self.breath_in, 0.0, 1.0, d.breath_in),
-            key_sounds: fix(self.key_sounds, 0.0, 1.0, d.key_sounds),
-            slap: fix(self.slap, 0.0, 1.0, d.slap),
+            scoop_cents: clamped_or(self.scoop_cents, 0.0, 300.0, d.scoop_cents),
+            scoop_s: clamped_or(self.scoop_s, 0.02, 1.0, d.scoop_s),
+            fall_cents: clamped_or(self.fall_cents, 0.0, 1_200.0, d.fall_cents),
+            fall_s: clamped_or(self.fall_s, 0.05, 2.0, d.fall_s),
+            breath_in: clamped_or(self.breath_in, 0.0, 1.0, d.breath_in),
+            key_sounds: clamped_or(self.key_sounds, 0.0, 1.0, d.key_sounds),
+            slap: clamped_or(self.slap, 0.0, 1.0, d.slap),
         }
     }
 

@@ -28,6 +28,7 @@ use crate::instrument::players::{MOST_PLAYERS, Players, Split};
 use crate::instrument::settings::Settings;
 use crate::instrument::stage::Chair;
 use crate::instrument::stereo::gains;
+use crate::units::clamped_or;
 use section::Section;
 
 /// Samples of the host between two decisions whether a player sleeps.
@@ -322,7 +323,7 @@ impl Ensemble {
             }
             seat.apply(event);
             if let Event::Pan { position } = event {
-                seat.pan = if position.is_finite() { position.clamp(-1.0, 1.0) } else { 0.0 };
+                seat.pan = clamped_or(position, -1.0, 1.0, 0.0);
                 if count > 1 {
                     seat.sit(Person::seat(number, count, width), seat.pan);
                 }

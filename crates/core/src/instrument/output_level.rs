@@ -4,7 +4,7 @@ use crate::dsp::glide::Glide;
 use crate::instrument::channels::Channels;
 use crate::instrument::settings::Settings;
 use crate::maths;
-use crate::units::REFERENCE_RADIUS_M;
+use crate::units::{REFERENCE_RADIUS_M, clamped_or};
 
 /// Full scale per pascal at 1 m from a B flat clarinet: 1 Pa is -6 dBFS. A larger instrument is heard from further away,
 /// in proportion to its nominal bore. So two instruments that differ only in size are equally loud, and a bass does not
@@ -45,7 +45,7 @@ impl OutputLevel {
 
     /// Goes to a volume, a factor of 0..=4.
     pub fn set_volume(&mut self, volume: f32) {
-        self.volume.go_to(if volume.is_finite() { volume.clamp(0.0, VOLUME_MOST) } else { 1.0 });
+        self.volume.go_to(clamped_or(volume, 0.0, VOLUME_MOST, 1.0));
     }
 
     /// Takes over the volume of the instrument that this one replaces.

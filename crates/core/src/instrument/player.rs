@@ -50,7 +50,7 @@ use crate::instrument::settings::{BreathResponse, Settings};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::maths;
 use crate::reed::physical::P_REF_PA;
-use crate::units::{SoundingNote, cents};
+use crate::units::{SoundingNote, cents, clamped_or};
 pub use attack::Attack;
 use attack::Onset;
 use breath::Breath;
@@ -276,8 +276,7 @@ impl Player {
             Event::KeyPressure(pressure) => self.breath.press(pressure),
             Event::BreathFromKeys => self.breath.forget_source(),
             Event::Bend { cents } => {
-                self.bend_cents =
-                    f64::from(if cents.is_finite() { cents.clamp(-BEND_CENTS, BEND_CENTS) } else { 0.0 });
+                self.bend_cents = f64::from(clamped_or(cents, -BEND_CENTS, BEND_CENTS, 0.0));
                 self.posture = None;
             }
             Event::Reed { h, k } => self.reed.set(h, k),

@@ -1,7 +1,7 @@
 //! How many players play, and how they sit and share the notes.
 
 use crate::control::parts::MOST;
-use crate::units::fix;
+use crate::units::clamped_or;
 
 /// Most players of one instrument.
 pub const MOST_PLAYERS: usize = MOST;
@@ -47,8 +47,8 @@ impl Players {
         Self {
             count: self.count.clamp(1, MOST_PLAYERS as i32),
             split: self.split,
-            spread_cents: fix(self.spread_cents, 0.0, 25.0, d.spread_cents),
-            width: fix(self.width, 0.0, 1.0, d.width),
+            spread_cents: clamped_or(self.spread_cents, 0.0, 25.0, d.spread_cents),
+            width: clamped_or(self.width, 0.0, 1.0, d.width),
         }
     }
 

@@ -22,7 +22,7 @@ mod shoebox;
 #[cfg(test)]
 mod tests;
 
-use crate::units::fix;
+use crate::units::clamped_or;
 pub use room_sound::RoomSound;
 
 /// The room in which the instrument is heard.
@@ -51,10 +51,10 @@ impl Room {
     pub fn clamped(self) -> Self {
         let d = Self::default();
         Self {
-            amount: fix(self.amount, 0.0, 1.0, d.amount),
-            size_m: fix(self.size_m, 3.0, 40.0, d.size_m),
-            decay_s: fix(self.decay_s, 0.2, 4.0, d.decay_s),
-            tone: fix(self.tone, 0.0, 1.0, d.tone),
+            amount: clamped_or(self.amount, 0.0, 1.0, d.amount),
+            size_m: clamped_or(self.size_m, 3.0, 40.0, d.size_m),
+            decay_s: clamped_or(self.decay_s, 0.2, 4.0, d.decay_s),
+            tone: clamped_or(self.tone, 0.0, 1.0, d.tone),
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::reed::ReedLaw;
 use crate::reed::law::{H_INIT, K_INIT, coupled_k};
 use crate::reed::physical::{P_REF_PA, PhysicalReed, ZETA_REFERENCE};
 use crate::reed::strength;
-use crate::units::fix;
+use crate::units::clamped_or;
 
 /// Softest and loudest breath are at least this far apart.
 const LEAST_BREATH_RANGE: f32 = 0.05;
@@ -352,47 +352,47 @@ impl Settings {
     /// These settings with every number inside its range; a number that is not finite becomes its default. Real-time safe.
     pub fn clamped(self) -> Self {
         let d = Self::default();
-        let breath_softest = fix(self.breath_softest, 0.0, 0.5, d.breath_softest);
+        let breath_softest = clamped_or(self.breath_softest, 0.0, 0.5, d.breath_softest);
         Self {
             breath_response: self.breath_response,
-            breath_curve: fix(self.breath_curve, 0.5, 2.0, d.breath_curve),
+            breath_curve: clamped_or(self.breath_curve, 0.5, 2.0, d.breath_curve),
             breath_softest,
-            breath_loudest: fix(self.breath_loudest, 0.1, 1.0, d.breath_loudest)
+            breath_loudest: clamped_or(self.breath_loudest, 0.1, 1.0, d.breath_loudest)
                 .max(breath_softest + LEAST_BREATH_RANGE),
-            breath_deadband: fix(self.breath_deadband, 0.0, 0.1, d.breath_deadband),
-            breath_full_kpa: fix(self.breath_full_kpa, 2.0, 20.0, d.breath_full_kpa),
-            noise: fix(self.noise, 0.0, 1.0, d.noise),
-            tongue_ms: fix(self.tongue_ms, 1.0, 20.0, d.tongue_ms),
-            legato_ms: fix(self.legato_ms, 5.0, 15.0, d.legato_ms),
-            life: fix(self.life, 0.0, 1.0, d.life),
+            breath_deadband: clamped_or(self.breath_deadband, 0.0, 0.1, d.breath_deadband),
+            breath_full_kpa: clamped_or(self.breath_full_kpa, 2.0, 20.0, d.breath_full_kpa),
+            noise: clamped_or(self.noise, 0.0, 1.0, d.noise),
+            tongue_ms: clamped_or(self.tongue_ms, 1.0, 20.0, d.tongue_ms),
+            legato_ms: clamped_or(self.legato_ms, 5.0, 15.0, d.legato_ms),
+            life: clamped_or(self.life, 0.0, 1.0, d.life),
             vibrato: self.vibrato.clamped(),
             attack: self.attack,
-            strength: fix(self.strength, 1.5, 5.0, d.strength),
-            lip: fix(self.lip, 0.6, 1.4, d.lip),
-            zeta: fix(self.zeta, 0.05, 0.9, d.zeta),
-            damping: fix(self.damping, 0.2, 2.0, d.damping),
-            lay: fix(self.lay, 0.0, 0.5, d.lay),
-            reed_h: fix(self.reed_h, 1.0, 5.0, d.reed_h),
-            reed_k: fix(self.reed_k, 0.1, 2.0, d.reed_k),
+            strength: clamped_or(self.strength, 1.5, 5.0, d.strength),
+            lip: clamped_or(self.lip, 0.6, 1.4, d.lip),
+            zeta: clamped_or(self.zeta, 0.05, 0.9, d.zeta),
+            damping: clamped_or(self.damping, 0.2, 2.0, d.damping),
+            lay: clamped_or(self.lay, 0.0, 0.5, d.lay),
+            reed_h: clamped_or(self.reed_h, 1.0, 5.0, d.reed_h),
+            reed_k: clamped_or(self.reed_k, 0.1, 2.0, d.reed_k),
             coupled: self.coupled,
-            reed_a: fix(self.reed_a, 0.0, 2.0, d.reed_a),
-            a4_hz: fix(self.a4_hz, A4_RANGE_HZ.0 as f32, A4_RANGE_HZ.1 as f32, d.a4_hz),
+            reed_a: clamped_or(self.reed_a, 0.0, 2.0, d.reed_a),
+            a4_hz: clamped_or(self.a4_hz, A4_RANGE_HZ.0 as f32, A4_RANGE_HZ.1 as f32, d.a4_hz),
             tuning: self.tuning,
-            temperature_c: fix(self.temperature_c, 10.0, 40.0, d.temperature_c),
-            vent_loss: fix(self.vent_loss, 0.0, 4.0, d.vent_loss),
-            gain_db: fix(self.gain_db, -60.0, 24.0, d.gain_db),
+            temperature_c: clamped_or(self.temperature_c, 10.0, 40.0, d.temperature_c),
+            vent_loss: clamped_or(self.vent_loss, 0.0, 4.0, d.vent_loss),
+            gain_db: clamped_or(self.gain_db, -60.0, 24.0, d.gain_db),
             listening: Listening {
                 mode: self.listening.mode,
-                distance_m: fix(self.listening.distance_m, 0.2, 10.0, d.listening.distance_m),
-                angle_deg: fix(self.listening.angle_deg, -180.0, 180.0, d.listening.angle_deg),
-                height_m: fix(self.listening.height_m, -1.0, 2.0, d.listening.height_m),
-                width_deg: fix(self.listening.width_deg, 0.0, 180.0, d.listening.width_deg),
+                distance_m: clamped_or(self.listening.distance_m, 0.2, 10.0, d.listening.distance_m),
+                angle_deg: clamped_or(self.listening.angle_deg, -180.0, 180.0, d.listening.angle_deg),
+                height_m: clamped_or(self.listening.height_m, -1.0, 2.0, d.listening.height_m),
+                width_deg: clamped_or(self.listening.width_deg, 0.0, 180.0, d.listening.width_deg),
             },
             reach: self.reach.clamped(),
             room: self.room.clamped(),
             techniques: self.techniques.clamped(),
             tract: self.tract.clamped(),
-            glissando_s: fix(self.glissando_s, 0.0, 3.0, d.glissando_s),
+            glissando_s: clamped_or(self.glissando_s, 0.0, 3.0, d.glissando_s),
             articulation: self.articulation.clamped(),
             players: self.players.clamped(),
             alternates: self.alternates,

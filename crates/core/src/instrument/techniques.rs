@@ -1,6 +1,6 @@
 //! What a player does beside blowing a note: growl, flutter tongue, subtone, the vocal tract. Plain numbers, all 0 at first.
 
-use crate::units::fix;
+use crate::units::clamped_or;
 
 /// What the pitch of a growling voice goes by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -55,13 +55,13 @@ impl Techniques {
     pub(super) fn clamped(self) -> Self {
         let d = Self::default();
         Self {
-            growl: fix(self.growl, 0.0, 1.0, d.growl),
+            growl: clamped_or(self.growl, 0.0, 1.0, d.growl),
             growl_pitch: self.growl_pitch,
-            growl_semitones: fix(self.growl_semitones, -24.0, 12.0, d.growl_semitones),
-            growl_hz: fix(self.growl_hz, 60.0, 400.0, d.growl_hz),
-            flutter: fix(self.flutter, 0.0, 1.0, d.flutter),
-            flutter_hz: fix(self.flutter_hz, 15.0, 35.0, d.flutter_hz),
-            subtone: fix(self.subtone, 0.0, 1.0, d.subtone),
+            growl_semitones: clamped_or(self.growl_semitones, -24.0, 12.0, d.growl_semitones),
+            growl_hz: clamped_or(self.growl_hz, 60.0, 400.0, d.growl_hz),
+            flutter: clamped_or(self.flutter, 0.0, 1.0, d.flutter),
+            flutter_hz: clamped_or(self.flutter_hz, 15.0, 35.0, d.flutter_hz),
+            subtone: clamped_or(self.subtone, 0.0, 1.0, d.subtone),
         }
     }
 }
@@ -79,8 +79,8 @@ impl Tract {
     /// Every number inside its range; a number that is not finite becomes its default. Real-time safe.
     pub(super) fn clamped(self) -> Self {
         Self {
-            amount: fix(self.amount, 0.0, 1.0, 0.0),
-            interval_semitones: fix(self.interval_semitones, -24.0, 24.0, 0.0),
+            amount: clamped_or(self.amount, 0.0, 1.0, 0.0),
+            interval_semitones: clamped_or(self.interval_semitones, -24.0, 24.0, 0.0),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Strength of a tongue slap that a knob reports. The link to the knob detects each slap once.
 
+use crate::units::clamped_or;
+
 /// Speed of the hardest slap, rad/s: what a knob may turn at before it is switched off.
 const FULL_SPEED_RAD_S: f32 = 60.0;
 /// Softest slap: below this nothing would be heard (by judgement).
@@ -8,7 +10,7 @@ const LEAST_STRENGTH: f32 = 0.05;
 /// Strength, 0..=1, of a slap with this peak speed in the slap region, rad/s of either sign. Real-time safe.
 pub fn slap_strength(speed_rad_s: f32) -> f32 {
     let unit = speed_rad_s.abs() / FULL_SPEED_RAD_S;
-    if unit.is_finite() { unit.clamp(LEAST_STRENGTH, 1.0) } else { LEAST_STRENGTH }
+    clamped_or(unit, LEAST_STRENGTH, 1.0, LEAST_STRENGTH)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 
 use super::TickContext;
 use crate::instrument::settings::{BreathResponse, Settings};
+use crate::units::clamped_or;
 
 /// Time constant of breath that rises behind the tongue, s.
 pub const BREATH_RISE_S: f64 = 0.002;
@@ -57,7 +58,7 @@ impl Breath {
     /// loudest breath of the settings the band narrows to nothing, so that both stay what they are. Rest is rest.
     pub fn set_level(&mut self, level: f32, settings: &Settings) {
         self.live = true;
-        let level = f64::from(if level.is_finite() { level.clamp(0.0, 1.0) } else { 0.0 });
+        let level = f64::from(clamped_or(level, 0.0, 1.0, 0.0));
         let (softest, loudest) = match settings.breath_response {
             BreathResponse::Played => (settings.breath_softest.into(), settings.breath_loudest.into()),
             BreathResponse::Physical => (0.0, 1.0),
@@ -74,12 +75,12 @@ impl Breath {
 
     /// The velocity of a new key, 0..=1; not a number counts as 0.5.
     pub fn set_velocity(&mut self, velocity: f32) {
-        self.velocity = f64::from(if velocity.is_finite() { velocity.clamp(0.0, 1.0) } else { 0.5 });
+        self.velocity = f64::from(clamped_or(velocity, 0.0, 1.0, 0.5));
     }
 
     /// The keys are pressed on, 0..=1; not a number counts as 0.
     pub fn press(&mut self, pressure: f32) {
-        self.pressed = f64::from(if pressure.is_finite() { pressure.clamp(0.0, 1.0) } else { 0.0 });
+        self.pressed = f64::from(clamped_or(pressure, 0.0, 1.0, 0.0));
     }
 
     /// A machine slurs over an interval, cents, from one register to another: a difficult slur begins a short dip of the

@@ -2,6 +2,7 @@
 
 use super::breath::BREATH_FOLLOW_S;
 use super::step_towards;
+use crate::units::clamped_or;
 
 /// A factor counts as arrived when it is this near to its target.
 const ARRIVED: f32 = 1e-4;
@@ -22,8 +23,7 @@ impl Default for ReedSmoothing {
 impl ReedSmoothing {
     /// New factors on H and k, 0.1..=10; not a number counts as 1.
     pub fn set(&mut self, h: f32, k: f32) {
-        let fix = |x: f32| if x.is_finite() { x.clamp(0.1, 10.0) } else { 1.0 };
-        self.targets = [fix(h), fix(k)];
+        self.targets = [h, k].map(|factor| clamped_or(factor, 0.1, 10.0, 1.0));
     }
 
     /// The factors on H and k now.

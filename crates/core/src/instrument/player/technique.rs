@@ -14,6 +14,7 @@ use crate::instrument::person::Person;
 use crate::instrument::settings::Settings;
 use crate::instrument::techniques::GrowlPitch;
 use crate::maths;
+use crate::units::clamped_or;
 use flutter::Flutter;
 use growl::Growl;
 
@@ -54,7 +55,7 @@ pub struct Techniques {
 impl Techniques {
     /// A controller's amount, 0..=1; it adds to that of the settings.
     pub fn set(&mut self, which: Technique, amount: f32) {
-        self.added[which as usize] = if amount.is_finite() { amount.clamp(0.0, 1.0) } else { 0.0 };
+        self.added[which as usize] = clamped_or(amount, 0.0, 1.0, 0.0);
     }
 
     /// None, of this player.

@@ -7,7 +7,7 @@
 use super::sway::{SWAY_TICKS, Sway};
 use crate::dsp::white::White;
 use crate::instrument::person::Person;
-use crate::units::fix;
+use crate::units::clamped_or;
 
 /// Swing of the pitch at depth 1, cents either way.
 pub const DEEPEST_CENTS: f64 = 25.0;
@@ -47,10 +47,10 @@ impl Vibrato {
     pub fn clamped(self) -> Self {
         let d = Self::default();
         Self {
-            depth: fix(self.depth, 0.0, 1.0, d.depth),
-            rate_hz: fix(self.rate_hz, 3.0, 8.0, d.rate_hz),
-            onset_s: fix(self.onset_s, 0.0, 2.0, d.onset_s),
-            unevenness: fix(self.unevenness, 0.0, 1.0, d.unevenness),
+            depth: clamped_or(self.depth, 0.0, 1.0, d.depth),
+            rate_hz: clamped_or(self.rate_hz, 3.0, 8.0, d.rate_hz),
+            onset_s: clamped_or(self.onset_s, 0.0, 2.0, d.onset_s),
+            unevenness: clamped_or(self.unevenness, 0.0, 1.0, d.unevenness),
         }
     }
 }
@@ -104,7 +104,7 @@ impl Swing {
 
     /// The controller adds to the depth of the settings, 0..=1; not a number counts as 0.
     pub fn set_controller(&mut self, depth: f32) {
-        self.controller = f64::from(if depth.is_finite() { depth.clamp(0.0, 1.0) } else { 0.0 });
+        self.controller = f64::from(clamped_or(depth, 0.0, 1.0, 0.0));
     }
 
     /// The same controller for a player on another instrument.
