@@ -13,6 +13,7 @@ use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::reed::ReedTables;
+use chalumeau_core::reed::physical::ZETA_REFERENCE;
 use clap::Args;
 
 /// Step of the curve, degrees: one of the knob's encoder.
@@ -73,7 +74,7 @@ pub struct FeltReedArgs {
 #[derive(Args)]
 pub struct ReedInAirArgs {
     /// Embouchure: flow strength of the reference reed, 0.05..0.9
-    #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within_f32(s, 0.05, 0.9))]
+    #[arg(long, value_name = "ZETA", default_value_t = ZETA_REFERENCE as f32, value_parser = |s: &str| within_f32(s, 0.05, 0.9))]
     zeta: f32,
     /// Reed strength as on the box, 1.5..5; 2.5 closes at 6 kPa [default: 2.5]
     #[arg(long, value_name = "N", value_parser = |s: &str| within_f32(s, 1.5, 5.0))]

@@ -13,8 +13,7 @@ use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::reed::ReedTables;
 use chalumeau_core::reed::law::K_INIT;
-use chalumeau_core::reed::physical::DimensionlessReed;
-use chalumeau_core::reed::physical::P_REF_PA;
+use chalumeau_core::reed::physical::{DimensionlessReed, P_REF_PA, ZETA_REFERENCE};
 use chalumeau_core::units::REFERENCE_RADIUS_M;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::Figure;
@@ -180,7 +179,7 @@ fn is_of_a_file(ending: &OsStr) -> bool {
 
 impl Drawing {
     fn zeta(&self) -> f64 {
-        self.zeta.unwrap_or(0.3)
+        self.zeta.unwrap_or(ZETA_REFERENCE)
     }
 
     /// The file of one figure, open before anything is measured.

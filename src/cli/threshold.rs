@@ -8,6 +8,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::ReedLaw;
+use chalumeau_core::reed::physical::ZETA_REFERENCE;
 use chalumeau_core::units::{Air, WrittenNote};
 use chalumeau_figure::threshold::{self, Strength, Thresholds};
 use clap::Args;
@@ -35,7 +36,7 @@ pub struct ThresholdCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// Embouchure: flow strength of the reed, 0.05..0.9
-    #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within(s, 0.05, 0.9))]
+    #[arg(long, value_name = "ZETA", default_value_t = ZETA_REFERENCE, value_parser = |s: &str| within(s, 0.05, 0.9))]
     zeta: f64,
     #[command(flatten)]
     air: AirArg,

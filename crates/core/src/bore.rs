@@ -36,3 +36,7 @@ pub mod sound_sources;
 pub mod tone_hole;
 pub mod transfer_matrix;
 pub mod wall_loss;
+
+/// Embouchure parameter zeta of the thresholds by which fingerings are judged: the reference reed's, of which the bore knows
+/// nothing else.
+pub(crate) const ZETA: f64 = 0.3;

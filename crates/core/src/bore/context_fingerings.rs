@@ -5,6 +5,7 @@
 //! note by the transfer matrices. One that is much off or much harder to blow is taken only when the player asks for it; its error
 //! is for the player to correct.
 
+use crate::bore::ZETA;
 use crate::bore::alternate_fingerings::fingering_choices;
 use crate::bore::fingering_finder::bits;
 use crate::bore::fingering_finder::mechanism::{Grip, Mechanism};
@@ -25,8 +26,6 @@ const SEARCH_CENTS: (f64, f64) = (-80.0, 120.0);
 const STEP_CENTS: f64 = 20.0;
 /// Secant steps from there; the third is nearer than 0.01 cents.
 const SECANTS: usize = 4;
-/// Embouchure of the thresholds, the default of the instrument.
-const ZETA: f64 = 0.3;
 
 /// An alternate, and what it is like beside the chart's fingering.
 #[derive(Clone, Copy, Debug, PartialEq)]

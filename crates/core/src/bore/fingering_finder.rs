@@ -11,14 +11,13 @@ pub mod mechanism;
 
 use std::ops::ControlFlow;
 
+use crate::bore::ZETA;
 use crate::bore::instrument_file::{Fingering, HoleKind, InstrumentFile};
 use crate::bore::transfer_matrix::{Resonance, TransferMatrix, threshold_gamma};
 use crate::maths;
 use crate::units::{Air, WrittenNote, cents};
 use mechanism::{Grip, MAX_FINGERS, Mechanism};
 
-/// Embouchure of the thresholds, the default of the instrument.
-const ZETA: f64 = 0.3;
 /// How far off a fingering may be to be found at all, cents: what lips can pull (docs/bend.md).
 pub const FARTHEST_CENTS: f64 = 40.0;
 /// What a lip holds without effort, cents: a note is easily let down, hardly pushed up.

@@ -433,6 +433,11 @@ mod tests {
     }
 
     #[test]
+    fn fingerings_are_judged_with_the_embouchure_that_plays_them() {
+        assert_eq!(crate::bore::ZETA, ZETA_REFERENCE);
+    }
+
+    #[test]
     fn a_lip_moves_the_closing_pressure_by_its_factors() {
         let lip = LipShape { opening: 1.2, channel: 1.2, knee: 0.8 };
         let shaped = Settings::default().under_lip(Some(lip));
