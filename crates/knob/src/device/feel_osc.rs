@@ -5,16 +5,11 @@
 //! most 100 a second, and once a second. The end is a bundle without torque and then silence, in which the bridge takes the
 //! torque away by itself. Whoever sends decides when ([`link`](crate::device::link)); the bridge's other end keeps its own limits.
 
+use crate::device::session::feeling::{AGAIN_US, LEAST_US};
 use crate::wire::Feel;
 use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType, encoder};
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
-
-/// Least time between two bundles, us.
-const LEAST_US: i64 = 10_000;
-
-/// A bundle is sent again after this much, us.
-const AGAIN_US: i64 = 1_000_000;
 
 /// Bundles without torque at the end, for UDP may lose one.
 const RESTS: u8 = 3;

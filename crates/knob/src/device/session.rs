@@ -31,7 +31,11 @@ const ALIVE_US: i64 = 20_000;
 /// Time between two ALIVE over MIDI, us.
 const ALIVE_MIDI_US: i64 = 100_000;
 /// Time between two HELLO to a device that counts, us: INFO tells the counts, and whether it is still the same device.
-const AGAIN_US: i64 = 2_000_000;
+const HELLO_AGAIN_US: i64 = 2_000_000;
+/// What the user wants and shows no effect (ARM, FREE, ZERO) is said again after this much, us.
+const INSIST_US: i64 = 50_000;
+/// How often ARM or ZERO is said for one act at most.
+const TRIES: u32 = 4;
 /// Least time between two frames over MIDI, us.
 const MIDI_SLOT_US: i64 = 20_000;
 /// STATE this old no longer says what the knob does, us: 125 periods, about twice the 130 ms in which serial devices let go.
@@ -564,7 +568,7 @@ impl HostSession {
             }
         }
         let info = self.info.as_ref()?;
-        if info.checks_age() && now_us - self.hello_us >= AGAIN_US {
+        if info.checks_age() && now_us - self.hello_us >= HELLO_AGAIN_US {
             return Some(self.hello(now_us));
         }
         if let Some(zero) = self.take_zero(now_us) {

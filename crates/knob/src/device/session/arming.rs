@@ -5,6 +5,7 @@
 //! told to let go after the user's act, so the act is over. Once the knob has been armed and no longer is, for whatever reason,
 //! a new act is needed. A knob that is armed while nobody wants it so is told FREE until it is not.
 
+use super::{INSIST_US, TRIES};
 use crate::wire::Info;
 pub use crate::wire::limits::HARD_CEILING_MNM;
 
@@ -13,11 +14,6 @@ pub const FIRST_CEILING_MNM: u16 = 100;
 /// Most that is offered without a further act, mNm. By judgement.
 pub const OFFERED_CEILING_MNM: u16 = 250;
 
-/// ARM and FREE that show no effect are said again after this much, us.
-const INSIST_US: i64 = 50_000;
-
-/// ARM of one act at most.
-const TRIES: u32 = 4;
 /// ARM that sets another ceiling of an armed knob. Nothing tells whether it has come, and ALIVE does not raise the ceiling.
 const CEILING_TRIES: u32 = 2;
 

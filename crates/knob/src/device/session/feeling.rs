@@ -3,10 +3,10 @@
 use crate::wire::Feel;
 
 /// Least time between two FEEL, us.
-const LEAST_US: i64 = 10_000;
+pub(crate) const LEAST_US: i64 = 10_000;
 
 /// FEEL is sent again after this much, us, so that a knob that missed or forgot one has it.
-const AGAIN_US: i64 = 1_000_000;
+pub(crate) const AGAIN_US: i64 = 1_000_000;
 
 /// A FEEL that is not echoed within this much was lost, us: twenty round trips of a USB line.
 const LOST_US: i64 = 100_000;

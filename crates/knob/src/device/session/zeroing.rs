@@ -4,12 +4,10 @@
 //! that has not is told again, for 200 ms: that is still the same act. ARM waits for it. A knob that is armed at a zero
 //! which the user believes gone turns back to it by itself.
 
-/// ZERO that shows no effect is said again after this much, us.
-const INSIST_US: i64 = 50_000;
+use super::{INSIST_US, TRIES};
+
 /// ZERO that could not be said for this long is forgotten, us: FREE, for which it may wait, has had its effect ten times over.
 const PATIENCE_US: i64 = 500_000;
-/// ZERO of one act at most.
-const TRIES: u32 = 4;
 /// As far from zero as this, degrees, and what the knob turns meanwhile, it has been heard: a hand on the knob is not still, and a
 /// zero that is wrong by so little turns nothing.
 const NEAR_DEG: f64 = 5.0;
