@@ -40,7 +40,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use breath_args::BreathArgs;
-pub use breath_args::BreathSource;
+pub use breath_args::{BreathSource, GAMMA_DEFAULT};
 use given::score_of;
 pub use given::{Given, TimedNote};
 

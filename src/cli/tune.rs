@@ -4,16 +4,15 @@ use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, number};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::progress_bar::progress;
-use crate::cli::score_args::preset_called;
+use crate::cli::score_args::{GAMMA_DEFAULT, preset_called};
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{NotesArg, PlayedArgs, dynamic, rate, within};
 use crate::presets::Preset;
-use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::pitch::{self, OTHER_CENTS};
 use chalumeau_core::analysis::spectrum::rms_dbfs;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{Clarinet, Model, Reach, Settings, Tuning};
-use chalumeau_core::measure::realism::OTHER_CENTS;
 use chalumeau_core::parallel;
 use chalumeau_core::score;
 use chalumeau_core::score::Score;
@@ -29,8 +28,6 @@ use std::sync::Arc;
 const SETTLE_S: f64 = 0.8;
 const MEASURE_S: f64 = 0.6;
 
-/// Gamma where nothing else is said.
-const GAMMA_DEFAULT: f64 = 0.5;
 /// Quieter than this is silence, dBFS without the user's gain. The softest note of pianissimo that was met has -42 dBFS; a reed
 /// through which no air flows (--A 0) moves at most as loud as -71 dBFS.
 const SILENT_DBFS: f64 = -65.0;
@@ -93,7 +90,7 @@ impl TuneCommand {
                 (curve, settings, format!("dynamic {dynamic}"))
             }
             None => {
-                let gamma = self.gamma.unwrap_or(GAMMA_DEFAULT);
+                let gamma = self.gamma.unwrap_or(f64::from(GAMMA_DEFAULT));
                 let curve = BreathCurve::constant(gamma as f32);
                 let settings = self.settings.blown_by(base.as_ref(), &curve, &file)?;
                 (curve, settings, format!("gamma {gamma}"))

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Gamma where nothing else is said: a full, easy tone.
-const GAMMA_DEFAULT: f32 = 0.5;
+pub const GAMMA_DEFAULT: f32 = 0.5;
 
 /// Where the breath comes from.
 #[derive(Args)]

@@ -6,6 +6,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::{Clarinet, KeyNotes};
 use chalumeau_core::measure::notes::{MeasuredNote, NoteMeter, Spread, spread};
 use chalumeau_core::score;
@@ -21,8 +22,6 @@ const RATE: u32 = 48_000;
 const BLOCK: usize = 512;
 /// Time for the last note to die away, s.
 const TAIL_S: f64 = 1.0;
-/// What the default settings tune to.
-const A4_HZ: f64 = 440.0;
 /// A B flat clarinet sounds two semitones lower than written.
 const TRANSPOSITION: i8 = 2;
 

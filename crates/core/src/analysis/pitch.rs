@@ -22,6 +22,8 @@ pub const LOWEST_HZ: f64 = 50.0;
 /// Highest fundamental looked for, Hz.
 pub const HIGHEST_HZ: f64 = 2500.0;
 
+/// A note further from the wanted one than this is another, cents.
+pub const OTHER_CENTS: f64 = 150.0;
 /// What lies lower than this share of a wanted note is not it.
 const FAR_BELOW: f64 = 0.7;
 

@@ -34,7 +34,7 @@ const GAP: Cutting = Cutting { least: 1, most: 1, flare: 0.2, length_weight: 0.6
 /// longest, between its register hole and the barrel, has 0.08.
 const LONGEST_SHARE: f64 = 0.1;
 /// How far a junction may be moved to find a place of its own, ticks: what the radii beside it can make up for.
-const MOVED_TICKS: f64 = 1.5;
+pub(super) const MOVED_TICKS: f64 = 1.5;
 
 /// One cylinder.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -6,7 +6,7 @@
 //! impedance the chart names; a played note lies up to some 40 cents below (the embouchure, the jets of the holes), and
 //! the automatic tuning takes that and a little more. Beyond [`FAR_CENTS`] it is the file that is wrong.
 
-use crate::bore::cells::{Cells, CellsError};
+use crate::bore::cells::{Cells, CellsError, MOVED_TICKS};
 use crate::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 use crate::bore::tone_hole;
 use crate::bore::transfer_matrix::{Peak, TransferMatrix};
@@ -22,8 +22,6 @@ const COMMON_CENTS: f64 = 20.0;
 /// The lattice's own rate, Hz, where holes are tried on the grid; at 44.1 kHz and its multiples it is 88.2 kHz, which
 /// differs by less than a tenth of a tick between holes.
 const GRID_HZ: f64 = 96_000.0;
-/// A hole moved by more than this against the others is reported, half samples: rounding alone stays below one.
-const MOVED_TICKS: f64 = 1.5;
 /// Moved by more than this no tuning brings it back, half samples (11 mm, a third of a tone on a clarinet).
 const LOST_TICKS: f64 = 6.0;
 
@@ -323,6 +321,7 @@ fn grid(file: &InstrumentFile, air: &Air) -> Vec<Concern> {
     let common = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
     for (hole, moved) in file.holes.iter().zip(moved) {
         let by = moved - common;
+        // Rounding alone stays below one.
         if by.abs() > MOVED_TICKS {
             let (hole, by_mm, lost) = (hole.name.clone(), by * tick_mm, by.abs() > LOST_TICKS);
             concerns.push(Concern::HoleMoved { hole, by_mm, lost });

@@ -17,7 +17,7 @@ use crate::units::{Air, cents};
 /// Widest step over which an alternate is taken, semitones: those of chromatic runs and of trills.
 const WIDEST_SEMITONES: u8 = 2;
 /// How far an alternate may be from the chart's fingering, cents: what a lip corrects unnoticed.
-const FARTHEST_CENTS: f64 = 15.0;
+const UNNOTICED_CENTS: f64 = 15.0;
 /// How much higher its threshold may be.
 const HARDEST: f64 = 1.15;
 /// Where a resonance is looked for, cents from its note, and in which steps. Without a reed's pull the chart plays up to 70 cents
@@ -45,7 +45,7 @@ pub struct Alternate {
 impl Alternate {
     /// Whether a player takes it without being asked: a lip corrects it unnoticed, and it speaks about as easily.
     fn is_good(&self) -> bool {
-        self.cents.abs() <= FARTHEST_CENTS && self.harder <= HARDEST
+        self.cents.abs() <= UNNOTICED_CENTS && self.harder <= HARDEST
     }
 }
 

@@ -21,7 +21,7 @@ use mechanism::{Grip, MAX_FINGERS, Mechanism};
 /// How far off a fingering may be to be found at all, cents: what lips can pull (docs/bend.md).
 pub const FARTHEST_CENTS: f64 = 40.0;
 /// What a lip holds without effort, cents: a note is easily let down, hardly pushed up.
-const LIP_CENTS: [f64; 2] = [-5.0, 12.0];
+const HELD_CENTS: [f64; 2] = [-5.0, 12.0];
 /// Height over the next lower resonance from which no doubt is left, dB.
 pub const SURE_DB: f64 = 6.0;
 /// One finger that changes the pitch by less than this, cents, makes no other fingering.
@@ -295,7 +295,7 @@ impl FingeringFinder {
         let evenness_db =
             lower.map_or(SURE_DB, |lower| 20.0 * maths::log10(f64::from(played.height / lower))).min(SURE_DB);
         let gamma_on = threshold_gamma(f64::from(played.height), ZETA);
-        let beyond = (off - LIP_CENTS[1]).max(LIP_CENTS[0] - off).max(0.0);
+        let beyond = (off - HELD_CENTS[1]).max(HELD_CENTS[0] - off).max(0.0);
         let cost = worth::CENT * beyond
             + worth::CENT_WITHIN * off.abs()
             + worth::GAMMA * (gamma_on - 1.0 / 3.0)

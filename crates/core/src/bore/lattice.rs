@@ -65,7 +65,7 @@ pub const MAX_TICKS: u32 = ROWS.1 - 8;
 /// whole ones each.
 pub const MAX_CHUNKS: usize = 7;
 /// States below this are set to 0, so that no denormal number slows a held note.
-const TINY: f64 = 1e-18;
+pub const TINY: f64 = 1e-18;
 
 /// Volume flows leaving through holes in one sample, by chunk and lane, see [`Tip::ended`]. A power of two chunks, one more than there may be: so it costs no multiplication to find a row of them.
 pub type HoleFlows<F> = [[F; LANES]; MAX_CHUNKS.next_power_of_two()];

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 /// Values added up beside each other.
-const LANES: usize = 8;
+pub const LANES: usize = 8;
 
 /// Whether the processor has vectors of eight numbers of single precision: AVX2.
 #[cfg(target_arch = "x86_64")]

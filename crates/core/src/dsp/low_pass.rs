@@ -5,11 +5,9 @@
 
 use std::f64::consts::PI;
 
-use crate::dsp::lanes::through_memory;
+use crate::dsp::lanes::{LANES, through_memory};
 use crate::maths;
 
-/// Lanes of the dot product; tap counts are multiples of it.
-pub const LANES: usize = 8;
 /// Width of the transition over the lower rate: 2:1 then costs 72 taps and passes 20 kHz to a host at 48 kHz.
 pub const TRANSITION: f64 = 1.0 / 6.0;
 /// Attenuation asked of the design, dB. Rounding the taps up gives more, never less.

@@ -30,8 +30,8 @@
 
 use std::sync::Arc;
 
-use crate::dsp::lanes::has_avx2;
-use crate::dsp::low_pass::{Kernel, LANES, TapRow, dot, dot_of, normalised, tap_rows};
+use crate::dsp::lanes::{LANES, has_avx2};
+use crate::dsp::low_pass::{Kernel, TapRow, dot, dot_of, normalised, tap_rows};
 use crate::dsp::warp::{BEYOND, ONE, SPEEDS, Warp};
 
 /// Largest number of phases stored exactly; above it, neighbouring phases are mixed linearly.

@@ -8,7 +8,8 @@
 
 use std::sync::Arc;
 
-use crate::dsp::low_pass::{Kernel, LANES, TapRow, dot, normalised, tap_rows};
+use crate::dsp::lanes::LANES;
+use crate::dsp::low_pass::{Kernel, TapRow, dot, normalised, tap_rows};
 
 /// Slowest and fastest clock: two octaves down and up.
 pub const SPEEDS: (f64, f64) = (0.25, 4.0);

@@ -4,9 +4,9 @@
 //! steady part, after the attack or the slur and before the release. A [`NoteMeter`] keeps the samples of one note at a time,
 //! at most [`LONGEST_S`] of it.
 
+use crate::analysis::pitch::OTHER_CENTS;
 use crate::analysis::pitch::{fundamental_near_hz, periodicity, refine_hz};
 use crate::analysis::spectrum::rms_dbfs;
-use crate::measure::realism::OTHER_CENTS;
 use crate::score::NoteSpan;
 use crate::units::cents;
 

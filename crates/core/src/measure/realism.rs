@@ -8,6 +8,7 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
+use crate::analysis::pitch::OTHER_CENTS;
 use crate::analysis::steady_note::{RATE_HZ, SECONDS, SteadyNote};
 use crate::analysis::to_f64;
 use crate::instrument::player::dynamics::MEZZO_FORTE;
@@ -22,8 +23,6 @@ const RECORDED: &str = include_str!("../../data/recorded_spectra.csv");
 const CLIP_DB: f64 = -60.0;
 /// What a note counts that does not sound or sounds in another register, dB.
 pub const FAIL_DB: f64 = 20.0;
-/// A note further off than this is another one, cents.
-pub const OTHER_CENTS: f64 = 150.0;
 /// What is compared is played this much softer, so that no peak meets the limiter, dB.
 pub const HEADROOM_DB: f64 = 20.0;
 /// Range of centroid ratios that counts as right.

@@ -3,12 +3,12 @@
 //! The opening belongs to the grid because not everything goes with the closing pressure: jets in the open holes take more from a loud note,
 //! and the knee of the lay is a smaller share of a wider opening.
 
+use chalumeau_core::analysis::pitch::OTHER_CENTS;
 use chalumeau_core::analysis::{pitch, spectrum};
 use chalumeau_core::instrument::held_note::{HeldNote, Start};
 use chalumeau_core::instrument::player::dynamics::{LipShape, PlayerModel};
 use chalumeau_core::instrument::presence::Presence;
 use chalumeau_core::instrument::{Listening, Model};
-use chalumeau_core::measure::realism::OTHER_CENTS;
 use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
 use chalumeau_core::units::{SoundingNote, cents};

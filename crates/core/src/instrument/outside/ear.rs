@@ -1,14 +1,11 @@
 //! One place: its ways from all sources, the filter of the bell at its angle, and presence.
 
 use super::lines::Lines;
-use crate::bore::lattice::Real;
+use crate::bore::lattice::{Real, TINY};
 use crate::dsp::lanes::through_memory;
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::{MAX_SOURCES, Paths};
 use crate::instrument::presence::{Presence, Section};
-
-/// States below this are set to 0.
-const TINY: f64 = 1e-18;
 
 /// A tick behind the samples before it, from where vectors can be read.
 #[inline(always)]

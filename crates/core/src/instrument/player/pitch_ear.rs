@@ -14,7 +14,7 @@ const MEAN: f64 = 6.0;
 /// The pressure crosses only after it has been below this share of its root mean square: noise around the mean is no period.
 const ARMED: f64 = 0.3;
 /// A period farther from the wanted one is not the note's, cents: less than from the second mode to the first.
-const FARTHEST_CENTS: f64 = 400.0;
+const STRAY_CENTS: f64 = 400.0;
 /// Share of a new period in what is heard: the mean of two or three.
 const NEW: f64 = 0.5;
 
@@ -48,7 +48,7 @@ impl PitchEar {
             self.armed = false;
             let after_s = tick_s * now / (now - before);
             let off = passed_s.map(|passed_s| cents(1.0 / (passed_s - after_s), wanted_hz));
-            self.off_cents = off.filter(|off| off.abs() < FARTHEST_CENTS).map(|off| {
+            self.off_cents = off.filter(|off| off.abs() < STRAY_CENTS).map(|off| {
                 let heard = self.off_cents.unwrap_or(off);
                 heard + NEW * (off - heard)
             });
@@ -81,7 +81,7 @@ mod tests {
                 }
                 match heard {
                     Some(heard) => assert!((heard - off).abs() < 10.0, "{hz} {off}: {heard}"),
-                    None => assert!(off > FARTHEST_CENTS, "{hz} {off}"),
+                    None => assert!(off > STRAY_CENTS, "{hz} {off}"),
                 }
             }
         }

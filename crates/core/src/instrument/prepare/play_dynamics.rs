@@ -8,6 +8,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::analysis::pitch::OTHER_CENTS;
 use crate::instrument::held_note::{HeldNote, TONGUE_HOLD_S};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
@@ -27,8 +28,6 @@ const FAR_DB: f64 = 0.5;
 const CLOSE_CENTS: f64 = 0.2;
 /// A note that stays further off, because its trim ends, is played less loudly, cents.
 const TRIM_ENDS_CENTS: f64 = 1.0;
-/// A pitch further off than this is another note, cents.
-const OTHER_CENTS: f64 = 150.0;
 /// Largest number of corrections of the trim at one dynamic.
 const TRIMS: usize = 3;
 /// Mouth pressures that are tried for the loudest dynamic, over that of the rule. Tongued harder, some notes begin in another

@@ -49,7 +49,7 @@ const OPENS_S: f64 = 0.03;
 /// Time constant with which the player corrects the pitch, s: slower than it is heard.
 const CORRECTS_S: f64 = 0.06;
 /// Farthest correction, cents.
-const FARTHEST_CENTS: f64 = 200.0;
+const CORRECTION_MOST_CENTS: f64 = 200.0;
 /// Near its ends a slide is the fingering's alone, cents.
 const ENDS_CENTS: f64 = 200.0;
 
@@ -156,7 +156,7 @@ impl Crossing {
         let wanted_hz = self.low_hz * maths::exp2(place / 1_200.0);
         let off = self.ear.hear(pressure, wanted_hz, period_s).unwrap_or(0.0);
         let corrected = self.correction - off * tick_s / CORRECTS_S;
-        self.correction = corrected.clamp(-FARTHEST_CENTS, FARTHEST_CENTS);
+        self.correction = corrected.clamp(-CORRECTION_MOST_CENTS, CORRECTION_MOST_CENTS);
     }
 
     /// How far the tract has taken over in the chalumeau, 0..=1.
