@@ -61,18 +61,16 @@ use glissando::Slide;
 use inflection::Inflection;
 use inhalation::Inhalation;
 use level_keeper::{Led, LevelKeeper};
-use life::Life;
 use lip_glide::LipGlide;
 use posture::{Fingered, Lags, Posture};
 use reed_glide::ReedGlide;
 use reed_smoothing::ReedSmoothing;
 use response::{Bodily, Response};
 use slur::Slur;
-use sway::{SWAY_TICKS, Sway};
+use sway::Swaying;
 use technique::Techniques;
 use tongue::Tongue;
 use tuning::PlayedTuning;
-use vibrato::Swing;
 use voicing::{Voiced, Voicing};
 
 /// Time the fingers take behind the tongue, ms; slurred they take the setting's time.
@@ -100,23 +98,6 @@ fn heard_power<F: Real>(voice: &Voice<F>) -> f64 {
     };
     let (left, right) = voice.heard();
     right.map_or(power(left), |right| 0.5 * (power(left) + power(right)))
-}
-
-/// What moves breath and lip beside what is asked.
-fn sway(
-    life: &mut Life,
-    swing: &mut Swing,
-    settings: &Settings,
-    posture: &Posture,
-    tick_s: f64,
-    model: &Model,
-) -> Sway {
-    let (amount, range_db) = match settings.breath_response {
-        // A blowing machine does not live.
-        BreathResponse::Physical => (0.0, None),
-        BreathResponse::Played => (f64::from(settings.life), Some(model.player.range_db)),
-    };
-    life.step(amount, &posture.lags.life) + swing.step(&settings.vibrato, range_db, tick_s)
 }
 
 /// What the player does now.
@@ -169,11 +150,7 @@ pub struct Player {
     fingered_cents: f64,
     lip_glide: LipGlide,
     onset: Onset,
-    life: Life,
-    swing: Swing,
-    sway: Sway,
-    /// Ticks until `sway` moves on.
-    sway_left: u32,
+    swaying: Swaying,
     inflection: Inflection,
     inhalation: Inhalation,
     /// The reed was changed while nothing sounded: it must not move, which would be heard.
@@ -185,8 +162,7 @@ impl Player {
     pub fn new(person: Person) -> Self {
         Self {
             person,
-            life: Life::of(&person),
-            swing: Swing::of(&person),
+            swaying: Swaying::of(&person),
             techniques: Techniques::of(&person),
             // The voice at its beginning knows the reference reed alone.
             has_other_reed: true,
@@ -280,7 +256,7 @@ impl Player {
                 self.posture = None;
             }
             Event::Reed { h, k } => self.reed.set(h, k),
-            Event::Vibrato(depth) => self.swing.set_controller(depth),
+            Event::Vibrato(depth) => self.swaying.swing.set_controller(depth),
             Event::TongueSlap { strength } => self.tongue_slap(strength, model, voice),
             Event::TryHoles(tried) => {
                 self.fingers.try_holes(tried);
@@ -337,7 +313,7 @@ impl Player {
         self.breath.set_velocity(velocity);
         if !slurred {
             self.prepare();
-            self.swing.begin_note();
+            self.swaying.swing.begin_note();
             self.lip_glide.help(retongued::lip_help(self.ear.amplitude(), model.place(fingering)));
         }
         self.finger(fingering, slurred, model, voice);
@@ -590,15 +566,7 @@ impl Player {
         let ear = (led == Led::default() && self.tongue.is_away() && !self.breath.is_dipping())
             .then_some(&self.ear);
         self.onset.tick(tongue_holds, tick_s);
-        self.sway_left = match self.sway_left {
-            // Nobody sways what nobody holds; a bore that is moved does not fall silent.
-            _ if is_idle => 0,
-            0 => {
-                self.sway = sway(&mut self.life, &mut self.swing, settings, posture, tick_s, model);
-                SWAY_TICKS - 1
-            }
-            left => left - 1,
-        };
+        let sway = self.swaying.tick(is_idle, settings, &posture.lags.life, tick_s, model.player.range_db);
         let in_place = tongue_holds || !key_down;
         let note_lip = self.lip_glide.tick(
             posture.note_lip(),
@@ -609,7 +577,7 @@ impl Player {
         let bodily = Bodily {
             note_lip,
             onset: &self.onset,
-            sway: &self.sway,
+            sway: &sway,
             settles: tongue_holds,
             fade: self.inflection.fade(),
         };
@@ -633,7 +601,7 @@ impl Player {
             self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
         let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, &context);
         let beside_cents = self.slide.as_ref().map_or(0.0, Slide::beside_cents);
-        let added_cents = (self.sway.cents, self.inflection.cents() + beside_cents);
+        let added_cents = (sway.cents, self.inflection.cents() + beside_cents);
         let has_other_speed = self.tuning.tick(fingering, gamma, added_cents, &context, model, lattice);
         let drive = Drive { p_mouth, tongue, noise: f64::from(settings.noise), reed: posture.reed };
         if has_other_speed {

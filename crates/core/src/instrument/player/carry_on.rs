@@ -44,7 +44,7 @@ impl Player {
             bend_cents: self.bend_cents,
             reed: self.reed,
             techniques: self.techniques.carried(&person),
-            swing: self.swing.carried(&person),
+            swaying: self.swaying.carried(&person),
             chosen: self.chosen,
             ..Self::new(person)
         }
@@ -57,7 +57,7 @@ impl Player {
         self.bend_cents = from.bend_cents;
         self.reed = from.reed;
         self.techniques.follow(&from.techniques);
-        self.swing.follow(&from.swing);
+        self.swaying.swing.follow(&from.swaying.swing);
         self.chosen = from.chosen;
         self.fingers.follow(&from.fingers);
         self.posture = None;

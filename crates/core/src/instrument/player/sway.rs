@@ -1,5 +1,10 @@
 //! What breath and lip do beside what is asked: the sum of [`life`](super::life) and [`vibrato`](super::vibrato).
 
+use super::life::{Life, LifeLags};
+use super::vibrato::Swing;
+use crate::instrument::person::Person;
+use crate::instrument::settings::{BreathResponse, Settings};
+
 /// Ticks between two values: 0.7 ms. The breath's own lag smooths their steps; the lip's are below 0.1 dB.
 pub const SWAY_TICKS: u32 = 4;
 
@@ -34,6 +39,56 @@ impl std::ops::Add for Sway {
             reed_cents: self.reed_cents + other.reed_cents,
             cents: self.cents + other.cents,
         }
+    }
+}
+
+/// State: life and vibrato of one player, and how far they move breath and lip now.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Swaying {
+    life: Life,
+    /// The vibrato.
+    pub swing: Swing,
+    now: Sway,
+    /// Ticks until `now` moves on.
+    left: u32,
+}
+
+impl Swaying {
+    /// At rest, as this player sways.
+    pub fn of(person: &Person) -> Self {
+        Self { life: Life::of(person), swing: Swing::of(person), ..Self::default() }
+    }
+
+    /// The same under its controller, for a player on another instrument.
+    pub fn carried(&self, person: &Person) -> Self {
+        Self { swing: self.swing.carried(person), ..Self::of(person) }
+    }
+
+    /// The sway of this tick of `tick_s` seconds; a dynamic of 1 is `range_db` above 0. Real-time safe.
+    pub fn tick(
+        &mut self,
+        is_idle: bool,
+        settings: &Settings,
+        lags: &LifeLags,
+        tick_s: f64,
+        range_db: f64,
+    ) -> Sway {
+        self.left = match self.left {
+            // Nobody sways what nobody holds; a bore that is moved does not fall silent.
+            _ if is_idle => 0,
+            0 => {
+                let (amount, range_db) = match settings.breath_response {
+                    // A blowing machine does not live.
+                    BreathResponse::Physical => (0.0, None),
+                    BreathResponse::Played => (f64::from(settings.life), Some(range_db)),
+                };
+                self.now =
+                    self.life.step(amount, lags) + self.swing.step(&settings.vibrato, range_db, tick_s);
+                SWAY_TICKS - 1
+            }
+            left => left - 1,
+        };
+        self.now
     }
 }
 
