@@ -245,10 +245,9 @@ impl Posture {
 
     /// Where the lip goes for this note.
     pub fn note_lip(&self) -> NoteLip {
-        let [between, always, zeta, growth, altissimo] = self.at;
-        let per_cent = self.played.as_ref().map_or(0.0, |played| played.resonance_per_cent);
+        let resonance_per_cent = self.played.as_ref().map_or(0.0, |played| played.resonance_per_cent);
         let MovingReed { resonance_hz, damping, .. } = self.free;
-        [resonance_hz, damping, self.place, between, always, zeta, growth, altissimo, per_cent]
+        NoteLip { resonance_hz, damping, place: self.place, at: self.at, resonance_per_cent }
     }
 
     /// Gives the reed the lip of a dynamic, 0..=1, on its way to the note; nothing where the breath is physical.
@@ -261,7 +260,7 @@ impl Posture {
         let other = &played.other_reed;
         played.rows = played.note.rows(dynamic)
             + self.rows_per_cent * (other.flat_cents(dynamic) - other.flat_cents(MEZZO_FORTE));
-        let [resonance_hz, damping, _, at @ .., _] = note_lip;
+        let NoteLip { resonance_hz, damping, at, .. } = note_lip;
         let free = MovingReed { resonance_hz, damping, ..self.free };
         played.placed.at = at;
         let reed = shaped(&free, self.subtone, played.placed.lip(dynamic).of_the_way(self.follows));

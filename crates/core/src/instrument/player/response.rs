@@ -140,8 +140,8 @@ impl Response {
         let lip = if (lip - wanted).abs() < STILL { wanted } else { lip };
         self.lip = Some(lip);
         let mut note_lip = bodily.note_lip;
-        let [_, _, place, .., resonance_per_cent] = note_lip;
-        note_lip[0] *= 1.0 + bodily.sway.reed_cents * resonance_per_cent;
+        let place = note_lip.place;
+        note_lip.resonance_hz *= 1.0 + bodily.sway.reed_cents * note_lip.resonance_per_cent;
         posture.shape_lip(bodily.sway.of(lip), note_lip);
         let breath = posture.played_breath(bodily.sway.of(wanted));
         // The lip is on its way, and the mouth pressure is half the way ahead of it, in logarithms: with that of the new note at once, a slur
