@@ -79,6 +79,15 @@ impl BreathFrom {
     }
 }
 
+/// A part of a controller's value, 0..=127.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The one that every device sends.
+    Coarse(u8),
+    /// What some devices send beside it.
+    Fine(u8),
+}
+
 /// A controller with a coarse and, on some devices, a fine part.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fader {
@@ -88,11 +97,10 @@ struct Fader {
 }
 
 impl Fader {
-    fn set(&mut self, is_fine: bool, value: u8) {
-        if is_fine {
-            self.fine = Some(value);
-        } else {
-            self.coarse = value;
+    fn set(&mut self, part: Part) {
+        match part {
+            Part::Coarse(value) => self.coarse = value,
+            Part::Fine(value) => self.fine = Some(value),
         }
     }
 
@@ -159,7 +167,7 @@ impl BreathChoice {
         &mut self,
         controller: BreathController,
         channel: usize,
-        (is_fine, value): (bool, u8),
+        part: Part,
         place: Place,
         is_held: bool,
         may_be_of_keys: bool,
@@ -170,11 +178,11 @@ impl BreathChoice {
         self.messages += 1;
         let is_snapshot = matches!(place, Place::Recognised | Place::Within);
         let claim = &mut self.claims[channel][controller as usize];
-        if is_snapshot && is_fine && self.heard != Some(controller) {
+        if is_snapshot && matches!(part, Part::Fine(_)) && self.heard != Some(controller) {
             // It does not show that the device has a fine part.
             return None;
         }
-        claim.fader.set(is_fine, value);
+        claim.fader.set(part);
         claim.message = self.messages;
         let unit = claim.fader.unit();
         let before = claim.unit.replace(unit);

@@ -2,6 +2,8 @@
 
 mod linked;
 
+use super::links::Source;
+use super::mix::MixControllers;
 use super::*;
 
 const NOTHING: [Event; 0] = [];
