@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::event::Timed;
+
 /// One channel, or two of the same length. In two, the instrument sounds as at its two
 /// [listening](super::listening) places, where it has two.
 #[derive(Debug)]
@@ -63,6 +65,25 @@ impl<'a> Channels<'a> {
         if let Some(right) = &mut self.right {
             of(right);
         }
+    }
+
+    /// Cuts the block at its events, which must be in order of time: `player` renders up to each event and applies it. An event at or
+    /// after the end of the block is applied at its end.
+    pub(super) fn cut_at<P, E>(
+        mut self,
+        events: impl IntoIterator<Item = Timed<E>>,
+        player: &mut P,
+        render: impl Fn(&mut P, Channels),
+        apply: impl Fn(&mut P, E),
+    ) {
+        let (mut done, end) = (0, self.len());
+        for Timed { at, event } in events {
+            let at = at.clamp(done, end);
+            render(player, self.part(done..at));
+            apply(player, event);
+            done = at;
+        }
+        render(player, self.part(done..end));
     }
 
     /// Multiplies each sample of all channels by the next gain.

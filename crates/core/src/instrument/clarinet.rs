@@ -268,19 +268,8 @@ impl Clarinet {
     }
 
     /// As [`render_events`](Self::render_events), into one or two channels. Real-time safe.
-    pub fn render_events_channels(
-        &mut self,
-        events: impl IntoIterator<Item = Timed<Event>>,
-        mut out: Channels,
-    ) {
-        let (mut done, end) = (0, out.len());
-        for Timed { at, event } in events {
-            let at = at.clamp(done, end);
-            self.render_channels(out.part(done..at));
-            self.apply(event);
-            done = at;
-        }
-        self.render_channels(out.part(done..end));
+    pub fn render_events_channels(&mut self, events: impl IntoIterator<Item = Timed<Event>>, out: Channels) {
+        out.cut_at(events, self, Self::render_channels, Self::apply);
     }
 
     /// As [`render`](Self::render), and calls `probe` once for each internal sample, in order of time.

@@ -376,16 +376,9 @@ impl Ensemble {
     pub fn render_events_channels(
         &mut self,
         events: impl IntoIterator<Item = Timed<PartEvent>>,
-        mut out: Channels,
+        out: Channels,
     ) {
-        let (mut done, end) = (0, out.len());
-        for Timed { at, event } in events {
-            let at = at.clamp(done, end);
-            self.render_channels(out.part(done..at));
-            self.apply(event);
-            done = at;
-        }
-        self.render_channels(out.part(done..end));
+        out.cut_at(events, self, Self::render_channels, Self::apply);
     }
 
     /// Whether the first player is heard as it is, and nobody else.
