@@ -66,6 +66,13 @@ pub(crate) fn rms(samples: &[f64]) -> f64 {
     (samples.iter().map(|sample| sample * sample).sum::<f64>() / samples.len().max(1) as f64).sqrt()
 }
 
+/// The value in the middle, of an even number the higher of the two; `None` for nothing. Allocates.
+pub(crate) fn upper_median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
 /// Largest sample position of a parabola through three equally spaced values, relative to the middle one, -0.5..=0.5,
 /// and the value there. `None` unless the middle one is a maximum.
 pub(crate) fn parabola(left: f64, middle: f64, right: f64) -> Option<(f64, f64)> {

@@ -4,7 +4,7 @@
 //! bins times their number. So neither the share of the band that harmonics hide nor a foreign line counts. The median of
 //! noise lies 1.6 dB below its mean; recordings were read in the same way.
 
-use crate::analysis::{BLACKMAN_HARRIS, cosine_window, without_mean};
+use crate::analysis::{BLACKMAN_HARRIS, cosine_window, upper_median, without_mean};
 use crate::maths;
 use chalumeau_fft as fft;
 
@@ -37,12 +37,10 @@ pub fn noise_db(samples: &[f64], rate_hz: f64, f0_hz: f64, bands_hz: &[(f64, f64
         .iter()
         .map(|&(low_hz, high_hz)| {
             let (first, last) = ((low_hz / bin_hz).ceil() as usize, (high_hz / bin_hz) as usize);
-            let mut measured: Vec<f64> = (first..=last.min(bins.len().saturating_sub(1)))
+            let measured = (first..=last.min(bins.len().saturating_sub(1)))
                 .filter(|&bin| between(bin as f64 * bin_hz))
-                .map(|bin| bins[bin].norm_sqr())
-                .collect();
-            measured.sort_by(f64::total_cmp);
-            let Some(power) = measured.get(measured.len() / 2) else { return f64::NEG_INFINITY };
+                .map(|bin| bins[bin].norm_sqr());
+            let Some(power) = upper_median(measured) else { return f64::NEG_INFINITY };
             // One-sided power per bin of white noise with variance v: v times the sum of the squared window.
             let per_bin = 2.0 * power / gain / windowed.len() as f64;
             let whole = per_bin * (high_hz - low_hz) / bin_hz;

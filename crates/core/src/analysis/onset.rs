@@ -6,6 +6,7 @@
 
 use crate::analysis::pitch::fundamental_hz;
 use crate::analysis::spectrum::{moving_rms, note_envelope};
+use crate::analysis::upper_median;
 
 /// Share of the steady level that counts as speaking.
 const SPEAKING: f64 = 0.9;
@@ -33,9 +34,7 @@ pub fn t90_s(samples: &[f64], rate_hz: f64, from_s: f64) -> Option<f64> {
     let note = samples.get(from..)?;
     let tail = note.len() - note.len() / 4;
     let envelope = moving_rms(note, rate_hz, window_s(&note[tail..], rate_hz));
-    let mut steady: Vec<f64> = envelope[tail..].to_vec();
-    steady.sort_by(f64::total_cmp);
-    let steady = *steady.get(steady.len() / 2)?;
+    let steady = upper_median(envelope[tail..].iter().copied())?;
     if steady <= 0.0 {
         return None;
     }

@@ -100,7 +100,7 @@ impl Partial {
     /// Median amplitude over the last third.
     fn steady(&self) -> Option<f64> {
         let last = &self.values[self.values.len() * 2 / 3..];
-        median(last.iter().map(|value| maths::complex::norm(*value)))
+        super::upper_median(last.iter().map(|value| maths::complex::norm(*value)))
     }
 
     /// Level, dB.
@@ -170,12 +170,6 @@ fn band(values: &[f64], (low_hz, high_hz): (f64, f64)) -> Vec<f64> {
 
 fn deviation(values: &[f64]) -> f64 {
     super::rms(&super::without_mean(values))
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 #[cfg(test)]

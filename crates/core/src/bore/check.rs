@@ -202,9 +202,8 @@ impl Check {
 
     /// How far nearly all notes are from the chart, cents, if that is worth a word and about the same for all: the median.
     pub fn common_cents(&self) -> Option<f64> {
-        let mut known: Vec<f64> = self.notes.iter().filter_map(|note| note.cents).collect();
-        known.sort_by(f64::total_cmp);
-        let median = *known.get(known.len() / 2)?;
+        let known: Vec<f64> = self.notes.iter().filter_map(|note| note.cents).collect();
+        let median = upper_median(&known)?;
         let near = known.iter().filter(|cents| (**cents - median).abs() < COMMON_CENTS).count();
         (known.len() > 2 && median.abs() > COMMON_CENTS && near * 4 > known.len() * 3).then_some(median)
     }
@@ -213,6 +212,13 @@ impl Check {
     pub fn is_usable(&self) -> bool {
         !self.concerns.iter().any(Concern::is_fatal)
     }
+}
+
+/// The value in the middle, of an even number the higher of the two; `None` for nothing.
+fn upper_median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
 }
 
 /// Holes under the fingers stand in a row, except that under the thumb; a key's hole may stand beside another.
@@ -235,12 +241,8 @@ fn overlaps(file: &InstrumentFile) -> Vec<Concern> {
 
 fn tuning(file: &InstrumentFile, notes: &[NoteCheck], others: &[Option<usize>]) -> Vec<Concern> {
     let mut concerns = Vec::new();
-    let mut known: Vec<f64> = notes.iter().filter_map(|note| note.cents).collect();
-    if known.is_empty() {
-        return vec![Concern::Silent];
-    }
-    known.sort_by(f64::total_cmp);
-    let median = known[known.len() / 2];
+    let known: Vec<f64> = notes.iter().filter_map(|note| note.cents).collect();
+    let Some(median) = upper_median(&known) else { return vec![Concern::Silent] };
     // One note alone is not all of them.
     let near = known.iter().filter(|cents| (**cents - median).abs() < FAR_CENTS).count();
     let all_off = known.len() > 2 && median.abs() > FAR_CENTS && near * 4 > known.len() * 3;
@@ -315,10 +317,8 @@ fn grid(file: &InstrumentFile, air: &Air) -> Vec<Concern> {
             f64::from(placed) - exact
         })
         .collect();
-    let mut sorted = moved.clone();
-    sorted.sort_by(f64::total_cmp);
     // What all have in common the fit makes up for in the mouthpiece.
-    let common = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let common = upper_median(&moved).unwrap_or(0.0);
     for (hole, moved) in file.holes.iter().zip(moved) {
         let by = moved - common;
         // Rounding alone stays below one.

@@ -6,6 +6,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::analysis::upper_median;
 use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::instrument::concert_pitch::A4_HZ;
@@ -29,9 +30,7 @@ fn factor(down_cents: f64) -> f64 {
 
 /// Leaves out the notes with wrong names, by their offsets in cents; the others keep their order.
 fn leave_out_wrong_names<T>(notes: &mut Vec<T>, off: impl Fn(&T) -> f64) {
-    let mut offsets: Vec<f64> = notes.iter().map(&off).collect();
-    offsets.sort_by(f64::total_cmp);
-    if let Some(&median) = offsets.get(offsets.len() / 2) {
+    if let Some(median) = upper_median(notes.iter().map(&off)) {
         notes.retain(|note| (off(note) - median).abs() <= MOST_CENTS);
     }
 }
