@@ -16,6 +16,7 @@ mod controllers;
 mod csv_table;
 #[cfg(feature = "devices")]
 mod doctor;
+mod doubt;
 mod feel_args;
 mod files;
 mod fingerings;

@@ -5,10 +5,11 @@ mod inputs;
 pub(super) mod plan;
 
 use crate::cli::csv_table::{CsvTable, quoted};
+use crate::cli::doubt::Doubt;
 use crate::cli::files;
 use crate::cli::idle_settings::{self, Idle};
 use crate::cli::progress_bar::bar;
-use crate::cli::render::{LIMITED, RenderCommand, Rendered};
+use crate::cli::render::{RenderCommand, Rendered};
 use crate::cli::shared_args::counted;
 use crate::cli::words::typed;
 use crate::cli::{Failure, parse};
@@ -18,6 +19,7 @@ use earlier::Earlier;
 use indicatif::ProgressBar;
 use inputs::{INPUTS, Inputs};
 use plan::{Plan, Variation};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::ops::ControlFlow;
@@ -86,35 +88,22 @@ struct Job {
     render: RenderCommand,
 }
 
-/// Files that are not what was asked for, by why.
+/// Files that may not be what was asked for, by why.
 #[derive(Default)]
-struct Doubtful {
-    limited: Vec<String>,
-    clipped: Vec<String>,
-    reset: Vec<String>,
-}
+struct Doubtful(BTreeMap<Doubt, Vec<String>>);
 
 impl Doubtful {
     fn look(&mut self, file: &str, &Rendered { level, resets, .. }: &Rendered) {
-        let kinds = [
-            (level.peak >= LIMITED, &mut self.limited),
-            (level.clipped > 0, &mut self.clipped),
-            (resets > 0, &mut self.reset),
-        ];
-        for (_, files) in kinds.into_iter().filter(|(is_so, _)| *is_so) {
-            files.push(file.to_owned());
+        for doubt in Doubt::all(level, resets) {
+            self.0.entry(doubt).or_default().push(file.to_owned());
         }
     }
 
-    fn warn(self) {
-        for (files, what) in [
-            (self.limited, "the limiter turned peaks down; lower gain-db for levels as played"),
-            (self.clipped, "samples clipped; lower gain-db or use bits = \"32f\""),
-            (self.reset, "the calculation broke down and the instrument was reset; please report this"),
-        ] {
+    fn warn(&self) {
+        for (doubt, files) in &self.0 {
             if let Some(first) = files.iter().min() {
                 let which = if files.len() == 1 { first.clone() } else { format!("{first} and others") };
-                say!("warning: {} ({which}): {what}", counted(files.len(), "file"));
+                say!("warning: {} ({which}): {}", counted(files.len(), "file"), doubt.text());
             }
         }
     }

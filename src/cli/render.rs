@@ -2,6 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::CsvTable;
+use crate::cli::doubt::Doubt;
 use crate::cli::files::{self, MaybeFile};
 use crate::cli::idle_settings::Idle;
 use crate::cli::plot_args::PlotArgs;
@@ -12,7 +13,6 @@ use crate::cli::score_args::ScoreArgs;
 use crate::cli::shared_args::{whole, within};
 use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
-use chalumeau_core::dsp::limiter::CEILING;
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::instrument::side_by_side::{self, Stand};
 use chalumeau_core::reed::physical::P_REF_PA;
@@ -46,9 +46,6 @@ Examples:
 /// Endings of names for sound in other formats, and for what sound is made of.
 const NO_WAV: [&str; 13] =
     ["aac", "aif", "aiff", "caf", "flac", "m4a", "mid", "midi", "mp3", "oga", "ogg", "opus", "wma"];
-
-/// A peak from here on was turned down: the limiter lets none past its ceiling, and hardly any by chance come as near.
-pub const LIMITED: f32 = 0.999 * CEILING;
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Bits {
@@ -256,17 +253,7 @@ impl RenderCommand {
         };
         let out = self.out.display();
         say!("{out}: {seconds:.3} s, {} Hz, {bits}, {channels}, {peak}", rate);
-        if level.clipped > 0 {
-            say!("warning: {} samples clipped; lower --gain-db or use --bits 32f", level.clipped);
-        }
-        if level.peak >= LIMITED {
-            say!("warning: the limiter turned peaks down; lower --gain-db for levels as played");
-        }
-        if resets > 0 {
-            say!(
-                "warning: the calculation broke down and the instrument was reset {resets} times; please report this"
-            );
-        }
+        Doubt::all(level, resets).for_each(|doubt| say!("warning: {}", doubt.text()));
     }
 }
 
