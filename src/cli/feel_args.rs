@@ -8,6 +8,10 @@ use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::wire::message::TorqueLaw;
 use clap::{Args, ValueEnum};
 
+fn inside(text: &str, (low, high): (f64, f64)) -> Result<f64, String> {
+    within(text, low, high)
+}
+
 /// Torque laws by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LawArg {
@@ -36,10 +40,10 @@ pub struct FeelArgs {
     #[arg(long, value_enum)]
     law: Option<LawArg>,
     /// Exaggeration of the differences in torque between notes, 1 (physical) ..5 [default: 3]
-    #[arg(long, value_name = "X", value_parser = |s: &str| within(s, 1.0, 5.0))]
+    #[arg(long, value_name = "X", value_parser = |s: &str| inside(s, FeelDesign::EXAGGERATION))]
     contrast: Option<f64>,
     /// Exaggeration of the differences in angle at which notes speak, 1 (physical) ..5 [default: 1]
-    #[arg(long, value_name = "X", value_parser = |s: &str| within(s, 1.0, 5.0))]
+    #[arg(long, value_name = "X", value_parser = |s: &str| inside(s, FeelDesign::EXAGGERATION))]
     place: Option<f64>,
     /// Notes speak and close at the angles of the reference reed, whatever reed is played: as in a study
     #[arg(long)]
@@ -51,13 +55,13 @@ pub struct FeelArgs {
     #[arg(long, value_name = "NOTE", value_parser = note)]
     reference: Option<u8>,
     /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450 [default: 55]
-    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 450.0))]
+    #[arg(long, value_name = "MNM", value_parser = |s: &str| inside(s, FeelDesign::STRENGTH_MNM))]
     torque: Option<f64>,
     /// Angle at which the reference reed closes on the reference note, degrees, 120..1080 [default: 360]
-    #[arg(long, value_name = "DEG", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
+    #[arg(long, value_name = "DEG", value_parser = |s: &str| inside(s, FeelDesign::TRAVEL_DEG))]
     travel: Option<f64>,
     /// Height of the mark at the threshold, mNm, 0..100 [default: 9 under flow, 6 under pressure]
-    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 100.0))]
+    #[arg(long, value_name = "MNM", value_parser = |s: &str| inside(s, FeelDesign::MARK_MNM))]
     detent: Option<f64>,
 }
 
@@ -122,5 +126,26 @@ impl FeelArgs {
     /// Contrast and Place in words.
     pub fn exaggeration(&self) -> String {
         format!("Contrast {}, Place {}", self.contrast(), self.place())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_help_says_the_ranges() {
+        let command = FeelArgs::augment_args(clap::Command::new("feel"));
+        for (flag, (low, high)) in [
+            ("contrast", FeelDesign::EXAGGERATION),
+            ("place", FeelDesign::EXAGGERATION),
+            ("torque", FeelDesign::STRENGTH_MNM),
+            ("travel", FeelDesign::TRAVEL_DEG),
+            ("detent", FeelDesign::MARK_MNM),
+        ] {
+            let arg = command.get_arguments().find(|arg| arg.get_id() == flag).unwrap();
+            let help = arg.get_help().unwrap().to_string().replace(" (physical) ", "");
+            assert!(help.contains(&format!("{low}..{high}")), "{flag}: {help}");
+        }
     }
 }

@@ -5,6 +5,7 @@ use crate::cli::csv_table::{TableArgs, number};
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::haptics::feel_parameters::HARD_CEILING_MNM;
 use chalumeau_core::haptics::torque_law;
 use chalumeau_core::haptics::{
     FeelRefused, FeelTable, NoteFeel, NoteRequirement, PlayedReed, RequirementSolver, TorqueLimits,
@@ -64,7 +65,7 @@ pub struct FeltReedArgs {
     #[command(flatten)]
     feel: FeelArgs,
     /// Most torque allowed, mNm, 0..450
-    #[arg(long, value_name = "MNM", default_value = "100", value_parser = |s: &str| within(s, 0.0, 450.0))]
+    #[arg(long, value_name = "MNM", default_value = "100", value_parser = |s: &str| within(s, 0.0, f64::from(HARD_CEILING_MNM)))]
     ceiling: f64,
     #[command(flatten)]
     reed: ReedInAirArgs,

@@ -88,6 +88,15 @@ impl Default for FeelDesign {
 }
 
 impl FeelDesign {
+    /// Range of Contrast and of Place, from physical.
+    pub const EXAGGERATION: (f64, f64) = (1.0, 5.0);
+    /// Range of the strength, mNm: up to what any knob may make.
+    pub const STRENGTH_MNM: (f64, f64) = (0.0, HARD_CEILING_MNM as f64);
+    /// Range of the angle of closure, degrees.
+    pub const TRAVEL_DEG: (f64, f64) = TRAVEL_DEG;
+    /// Range of the mark's height, mNm.
+    pub const MARK_MNM: (f64, f64) = (0.0, 100.0);
+
     /// Height of the mark at the threshold, mNm: `detent_mnm`, or the default of the torque law.
     ///
     /// Under the flow law the torque about the peak is flat: it stays within 12.7 % of the peak, the smallest difference that
@@ -104,18 +113,18 @@ impl FeelDesign {
 
     /// Whether every value lies in its range.
     pub(super) fn check(&self) -> Result<(), FeelRefused> {
-        for (name, given, low, high) in [
-            ("Contrast", self.contrast, 1.0, 5.0),
-            ("Place", self.place, 1.0, 5.0),
-            ("strength (mNm)", self.strength_mnm, 0.0, f64::from(HARD_CEILING_MNM)),
-            ("travel (degrees)", self.travel_deg, TRAVEL_DEG.0, TRAVEL_DEG.1),
-            ("damping (mNm s/rad)", self.damping_mnms, 0.0, 20.0),
-            ("friction (mNm)", self.friction_mnm, 0.0, 100.0),
-            ("wall (over closure)", self.wall_share, 0.5, 4.0),
-            ("stiffness of the wall (mNm per degree)", self.wall_mnm_per_deg, 0.0, 100.0),
-            ("spring of the slap (mNm per degree)", self.slap_mnm_per_deg, 0.0, 20.0),
-            ("mark (mNm)", self.mark_mnm(), 0.0, 100.0),
-            ("morph (ms)", f64::from(self.morph_ms), 20.0, 1_000.0),
+        for (name, given, (low, high)) in [
+            ("Contrast", self.contrast, Self::EXAGGERATION),
+            ("Place", self.place, Self::EXAGGERATION),
+            ("strength (mNm)", self.strength_mnm, Self::STRENGTH_MNM),
+            ("travel (degrees)", self.travel_deg, Self::TRAVEL_DEG),
+            ("damping (mNm s/rad)", self.damping_mnms, (0.0, 20.0)),
+            ("friction (mNm)", self.friction_mnm, (0.0, 100.0)),
+            ("wall (over closure)", self.wall_share, (0.5, 4.0)),
+            ("stiffness of the wall (mNm per degree)", self.wall_mnm_per_deg, (0.0, 100.0)),
+            ("spring of the slap (mNm per degree)", self.slap_mnm_per_deg, (0.0, 20.0)),
+            ("mark (mNm)", self.mark_mnm(), Self::MARK_MNM),
+            ("morph (ms)", f64::from(self.morph_ms), (20.0, 1_000.0)),
         ] {
             if !(low..=high).contains(&given) {
                 return Err(FeelRefused::Range { name, given, low, high });
