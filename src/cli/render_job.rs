@@ -7,8 +7,7 @@ use chalumeau_core::event::{Event, PartEvent};
 use chalumeau_core::instrument::listening::ListeningMode;
 use chalumeau_core::instrument::side_by_side::{PlayedBeside, Stand};
 use chalumeau_core::instrument::{Clarinet, Ensemble, Model, Probe, Settings};
-use chalumeau_core::score as player;
-use chalumeau_core::score::{Score, StereoBlocks};
+use chalumeau_core::score::{self, Score, StereoBlocks};
 use std::sync::Arc;
 
 /// Samples per block; any number gives the same sound.
@@ -110,7 +109,7 @@ impl RenderJob {
         let mut stereo = (channels == 2).then(in_room);
         let clarinet = PlayedBeside::new(self.clarinet());
         let is_stereo = stereo.is_some();
-        player::play_beside(
+        score::play_beside(
             stand,
             &clarinet,
             &self.score,
@@ -148,12 +147,12 @@ impl RenderJob {
             let mut ensemble = self.ensemble();
             match stereo {
                 Some(mut stereo) => {
-                    player::play_ensemble_stereo(&mut ensemble, &self.parts, BLOCK, |left, right| {
+                    score::play_ensemble_stereo(&mut ensemble, &self.parts, BLOCK, |left, right| {
                         each(left, &stereo.pan(left, right))
                     })?;
                 }
                 None => {
-                    player::play_ensemble(&mut ensemble, &self.parts, BLOCK, |block| each(block, &[block]))?
+                    score::play_ensemble(&mut ensemble, &self.parts, BLOCK, |block| each(block, &[block]))?
                 }
             }
             return Ok(ensemble.resets());
@@ -165,16 +164,14 @@ impl RenderJob {
                     Some(inside) => inside,
                     None => &mut |_| (),
                 };
-                player::play_stereo(&mut clarinet, &self.score, BLOCK, inside, |left, right| {
+                score::play_stereo(&mut clarinet, &self.score, BLOCK, inside, |left, right| {
                     each(left, &stereo.pan(left, right))
                 })?;
             }
             (None, Some(inside)) => {
-                player::play_probed(&mut clarinet, &self.score, BLOCK, inside, |block| {
-                    each(block, &[block])
-                })?;
+                score::play_probed(&mut clarinet, &self.score, BLOCK, inside, |block| each(block, &[block]))?;
             }
-            (None, None) => player::play(&mut clarinet, &self.score, BLOCK, |block| each(block, &[block]))?,
+            (None, None) => score::play(&mut clarinet, &self.score, BLOCK, |block| each(block, &[block]))?,
         }
         Ok(clarinet.resets())
     }

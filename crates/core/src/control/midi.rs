@@ -46,7 +46,7 @@ use links::{Link, Links};
 use mix::Mix;
 use said::Said;
 use snapshot::Run;
-use techniques::{Techniques, Wheel};
+use techniques::{AskedTechniques, Wheel};
 
 /// Where a breath event came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +69,7 @@ pub struct MidiDecoder {
     has_note_breath: bool,
     origin: Option<BreathOrigin>,
     mix: Mix,
-    techniques: Techniques,
+    techniques: AskedTechniques,
     links: Links,
     /// Breath that a linked controller has sent once, which the next key may show to be meant.
     linked_breath: Option<f32>,

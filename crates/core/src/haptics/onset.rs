@@ -42,7 +42,7 @@ const START: (f64, f64) = (0.9, 0.35);
 const BEYOND_CLOSURE: f64 = 0.8;
 
 /// The reed, with pressures over its own closing pressure.
-pub(super) struct MovingReed {
+pub(super) struct OnsetReed {
     /// Embouchure parameter of this reed.
     pub(super) zeta: f64,
     /// Half-width of the rounded part of the lay.
@@ -55,7 +55,7 @@ pub(super) struct MovingReed {
     pub(super) rate_hz: Option<f64>,
 }
 
-impl MovingReed {
+impl OnsetReed {
     /// Opening at a steady pressure difference, and minus its slope.
     fn opening(&self, gamma: f64) -> (f64, f64) {
         opening(1.0 - gamma, self.lay)
@@ -92,7 +92,7 @@ impl MovingReed {
 /// Every `(gamma, frequency in Hz)` at which a small oscillation neither grows nor decays: at most two for each resonance.
 pub(super) fn onsets<'a>(
     grid: &'a AdmittanceGrid,
-    reed: &'a MovingReed,
+    reed: &'a OnsetReed,
 ) -> impl Iterator<Item = (f64, f64)> + 'a {
     grid.modes(reed.swept_s).flat_map(move |(f_hz, height)| {
         let without_inertia = threshold_gamma(height, reed.zeta).min(START.0);
@@ -102,12 +102,12 @@ pub(super) fn onsets<'a>(
 
 /// `(gamma, frequency in Hz)` at which the steady state becomes stable again, with the reed nearly shut on the curve of the
 /// lay; the search starts at `f_hz`. `None` on a sharp lay, where it becomes stable at closure.
-pub(super) fn shut(grid: &AdmittanceGrid, reed: &MovingReed, f_hz: f64) -> Option<(f64, f64)> {
+pub(super) fn shut(grid: &AdmittanceGrid, reed: &OnsetReed, f_hz: f64) -> Option<(f64, f64)> {
     onset(grid, reed, f_hz, 1.0 + BEYOND_CLOSURE * reed.lay).filter(|&(gamma, _)| gamma > 1.0)
 }
 
 /// One onset, by Newton's method from a first guess; `None` if the search finds none.
-fn onset(grid: &AdmittanceGrid, reed: &MovingReed, mut f_hz: f64, mut gamma: f64) -> Option<(f64, f64)> {
+fn onset(grid: &AdmittanceGrid, reed: &OnsetReed, mut f_hz: f64, mut gamma: f64) -> Option<(f64, f64)> {
     for _ in 0..STEPS {
         let off = reed.balance(grid, f_hz, gamma)?;
         let (df, dg) = (1e-4 * f_hz, 1e-4 * gamma);

@@ -20,7 +20,7 @@ use crate::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use crate::haptics::admittance::{AdmittanceGrid, swept_s};
 use crate::haptics::extinction::EffectiveImpedance;
 use crate::haptics::onset;
-use crate::haptics::onset::MovingReed;
+use crate::haptics::onset::OnsetReed;
 use crate::haptics::played_reed::PlayedReed;
 use crate::units::{Air, WrittenNote, cents};
 
@@ -176,7 +176,7 @@ impl RequirementSolver {
         let (mut first, mut own) = ((gamma_on, f_hz), Some(gamma_on));
         let mut gamma_off = impedance.extinction(zeta, reed.jet_loss * reed.closing_pa());
         if let Some(&lip) = reed.lips.get(fingering) {
-            let reed = MovingReed { zeta, lay: reed.lay, lip, swept_s, rate_hz: self.rate_hz };
+            let reed = OnsetReed { zeta, lay: reed.lay, lip, swept_s, rate_hz: self.rate_hz };
             let grid = note.lattice.as_ref().unwrap_or(&note.bore);
             let mut starts: Vec<(f64, f64)> =
                 onset::onsets(grid, &reed).filter(|&(gamma, _)| gamma < 1.0).collect();

@@ -7,8 +7,8 @@
 //!
 //! All of it is plain loops over arrays, compiled with the lattice's vector features; the same bits with and without AVX2.
 
-mod ear;
 mod lines;
+mod listening_place;
 #[cfg(test)]
 mod tests;
 
@@ -19,8 +19,8 @@ use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::{Listening, ListeningMode};
 use crate::instrument::presence::Presence;
 use crate::units::Air;
-use ear::Ear;
 use lines::Lines;
+use listening_place::ListeningPlace;
 
 /// Ticks in which one way of listening fades into another: 13 ms at 96 kHz, too slow to click, and as long as the gain and the reed of another
 /// preset take: the old reed is not heard in the new way with the new gain.
@@ -61,7 +61,7 @@ struct Places<F> {
     /// Everything in one point instead.
     point: bool,
     two: bool,
-    ears: [Ear<F>; 2],
+    places: [ListeningPlace<F>; 2],
 }
 
 impl<F: Real> Places<F> {
@@ -73,15 +73,15 @@ impl<F: Real> Places<F> {
         rate_hz: f64,
     ) -> Self {
         let two = stereo && listening.mode == ListeningMode::Position && listening.width_deg > 0.0;
-        let ear = |side: f64| {
+        let place = |side: f64| {
             let (paths, presence) = match listening.mode {
                 ListeningMode::Position => (listening.position(side, sources, air), None),
                 _ => (Listening::everywhere(sources, air), Some(Presence::of(sources))),
             };
-            Ear::new(&paths, presence, lines, rate_hz)
+            ListeningPlace::new(&paths, presence, lines, rate_hz)
         };
-        let ears = if two { [ear(-1.0), ear(1.0)] } else { [ear(0.0), ear(0.0)] };
-        Self { point: listening.mode == ListeningMode::Point, two, ears }
+        let places = if two { [place(-1.0), place(1.0)] } else { [place(0.0), place(0.0)] };
+        Self { point: listening.mode == ListeningMode::Point, two, places }
     }
 }
 
@@ -236,7 +236,7 @@ impl<F: Real> Outside<F> {
             // Until now nobody wanted it.
             self.last = self.lines.together();
         }
-        for (next, now) in next.ears.iter_mut().zip(&self.now.ears) {
+        for (next, now) in next.places.iter_mut().zip(&self.now.places) {
             next.go_on((!self.now.point).then_some(now), &self.lines);
         }
         self.before = std::mem::replace(&mut self.now, next);
@@ -257,7 +257,7 @@ impl<F: Real> Outside<F> {
         self.lines.clear();
         self.out = [[0.0; TICK]; 2];
         (self.fresh, self.fading, self.filling) = (true, 0, 0);
-        self.now.ears.iter_mut().chain(&mut self.before.ears).for_each(Ear::silence);
+        self.now.places.iter_mut().chain(&mut self.before.places).for_each(ListeningPlace::silence);
     }
 
     /// All flows together in a sample of the tick.
@@ -290,7 +290,7 @@ impl<F: Real> Outside<F> {
         }
         let loudness = F::of(self.loudness);
         let pressure = |changes: [F; TICK]| changes.map(|change| (change * loudness).wide() as f32);
-        let [left, right] = &mut self.now.ears;
+        let [left, right] = &mut self.now.places;
         let heard = pressure(left.listen(&self.lines));
         [heard, if self.now.two { pressure(right.listen(&self.lines)) } else { heard }]
     }

@@ -68,7 +68,7 @@ use reed_smoothing::ReedSmoothing;
 use response::{Bodily, Response};
 use slur::Slur;
 use sway::Swaying;
-use technique::Techniques;
+use technique::PlayedTechniques;
 use tongue::Tongue;
 use tuning::PlayedTuning;
 use voicing::{Voiced, Voicing};
@@ -139,7 +139,7 @@ pub struct Player {
     tuning: PlayedTuning,
     reed: ReedSmoothing,
     glide: ReedGlide,
-    techniques: Techniques,
+    techniques: PlayedTechniques,
     voicing: Voicing,
     slide: Option<Slide>,
     keeper: LevelKeeper,
@@ -163,7 +163,7 @@ impl Player {
         Self {
             person,
             swaying: Swaying::of(&person),
-            techniques: Techniques::of(&person),
+            techniques: PlayedTechniques::of(&person),
             // The voice at its beginning knows the reference reed alone.
             has_other_reed: true,
             ..Self::default()

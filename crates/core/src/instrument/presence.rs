@@ -37,7 +37,7 @@ pub struct Presence {
 
 /// A filter `(b0 + b1 z + b2 z^2) / (1 - a1 z - a2 z^2)`, `z` a delay of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Section {
+pub struct Biquad {
     /// `b0`, `b1`, `b2`.
     pub forward: [f64; 3],
     /// `a1`, `a2`.
@@ -71,12 +71,12 @@ impl Presence {
     }
 
     /// The bell at a sample rate, Hz: that of Robert Bristow-Johnson, *Cookbook formulae for audio EQ biquad filter coefficients*.
-    pub fn bell(&self, rate_hz: f64) -> Section {
+    pub fn bell(&self, rate_hz: f64) -> Biquad {
         let turn = maths::tan(0.5 * TAU * (self.bell_hz / rate_hz).min(0.49)).recip();
         let (square, width, root) = (turn * turn, turn / self.bell_quality, root_gain(self.bell_db));
         let (wide, narrow) = (width * root, width / root);
         let scale = square + narrow + 1.0;
-        Section {
+        Biquad {
             forward: [square + wide + 1.0, 2.0 - 2.0 * square, square - wide + 1.0].map(|b| b / scale),
             back: [(2.0 * square - 2.0) / scale, (narrow - square - 1.0) / scale],
         }
@@ -99,7 +99,7 @@ mod tests {
     fn shelf_and_bell_have_the_gain_that_is_asked() {
         let presence = Presence::FITTED;
         for rate_hz in [88_200.0, 96_000.0, 192_000.0] {
-            let Section { forward: [b0, b1, b2], back: [a1, a2] } = presence.bell(rate_hz);
+            let Biquad { forward: [b0, b1, b2], back: [a1, a2] } = presence.bell(rate_hz);
             for f_hz in [50.0, 300.0, 1_000.0, presence.bell_hz, 2_000.0, presence.shelf_hz, 4_000.0, 8_000.0]
             {
                 let z = Complex64::cis(-TAU * f_hz / rate_hz);

@@ -55,7 +55,7 @@ impl TechniqueControllers {
 
 /// The controllers, and what was said last.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Techniques {
+pub struct AskedTechniques {
     /// The controllers now.
     pub controllers: TechniqueControllers,
     /// What the wheel does.
@@ -64,7 +64,7 @@ pub struct Techniques {
     said: [u8; ORDER.len()],
 }
 
-impl Techniques {
+impl AskedTechniques {
     /// What has changed.
     pub fn changed(&mut self) -> [Option<Event>; 1 + ORDER.len()] {
         let TechniqueControllers { wheel, own } = self.controllers;
@@ -89,13 +89,13 @@ impl Techniques {
 mod tests {
     use super::*;
 
-    fn said(techniques: &mut Techniques) -> Vec<Event> {
+    fn said(techniques: &mut AskedTechniques) -> Vec<Event> {
         techniques.changed().into_iter().flatten().collect()
     }
 
     #[test]
     fn the_wheel_does_what_was_chosen_and_lets_go_of_what_it_did() {
-        let mut techniques = Techniques::default();
+        let mut techniques = AskedTechniques::default();
         assert!(techniques.controllers.set(1, 127) && !techniques.controllers.set(17, 9));
         assert!(!techniques.controllers.set(21, 9));
         assert_eq!(said(&mut techniques), [Event::Vibrato(1.0)]);
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn the_larger_of_wheel_and_controller_counts() {
         let mut techniques =
-            Techniques { wheel: Wheel::Technique(Technique::Growl), ..Techniques::default() };
+            AskedTechniques { wheel: Wheel::Technique(Technique::Growl), ..AskedTechniques::default() };
         let growl = |amount| Event::Technique { which: Technique::Growl, amount };
         techniques.controllers.set(18, 127);
         assert_eq!(said(&mut techniques), [growl(1.0)]);

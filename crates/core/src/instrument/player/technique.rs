@@ -41,7 +41,7 @@ fn wrapped(phase: f64) -> f64 {
 
 /// State of the techniques.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Techniques {
+pub struct PlayedTechniques {
     /// What controllers add to the settings: growl, flutter, subtone.
     added: [f32; 3],
     /// Amounts now.
@@ -52,7 +52,7 @@ pub struct Techniques {
     interval: Known<f32, f64>,
 }
 
-impl Techniques {
+impl PlayedTechniques {
     /// A controller's amount, 0..=1; it adds to that of the settings.
     pub fn set(&mut self, which: Technique, amount: f32) {
         self.added[which as usize] = clamped_or(amount, 0.0, 1.0, 0.0);

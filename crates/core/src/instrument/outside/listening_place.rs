@@ -5,7 +5,7 @@ use crate::bore::lattice::{Real, TINY};
 use crate::dsp::lanes::through_memory;
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::{MAX_SOURCES, Paths};
-use crate::instrument::presence::{Presence, Section};
+use crate::instrument::presence::{Biquad, Presence};
 
 /// A tick behind the samples before it, from where vectors can be read.
 #[inline(always)]
@@ -19,7 +19,7 @@ fn behind<F: Real, const BEFORE: usize, const ALL: usize>(before: [F; BEFORE], t
 
 /// One place.
 #[derive(Clone)]
-pub(super) struct Ear<F> {
+pub(super) struct ListeningPlace<F> {
     /// Of each hole and the bell: a line's length beyond where its delayed line begins when a tick is at 0, and its gain.
     taps: [(usize, F); MAX_SOURCES],
     bell: Shelf<F>,
@@ -75,9 +75,9 @@ struct Resonance<F> {
 }
 
 impl<F: Real> Resonance<F> {
-    fn new(section: Section) -> Self {
+    fn new(biquad: Biquad) -> Self {
         let nothing = [F::default(); 2];
-        Self { forward: section.forward.map(F::of), back: section.back.map(F::of), x: nothing, y: nothing }
+        Self { forward: biquad.forward.map(F::of), back: biquad.back.map(F::of), x: nothing, y: nothing }
     }
 
     #[inline(always)]
@@ -101,7 +101,7 @@ impl<F: Real> Resonance<F> {
     }
 }
 
-impl<F: Real> Ear<F> {
+impl<F: Real> ListeningPlace<F> {
     /// Along these paths, at the internal rate, Hz. Real-time safe.
     pub(super) fn new(paths: &Paths, presence: Option<Presence>, lines: &Lines<F>, rate_hz: f64) -> Self {
         let mut taps = [(0, F::default()); MAX_SOURCES];
