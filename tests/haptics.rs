@@ -1,7 +1,7 @@
 //! Compares what the hand feels with what the instrument does. With `--nocapture` the tests print the figures of docs/feel.md.
 
 #[path = "support/memoryless.rs"]
-#[allow(dead_code)]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod memoryless;
 #[path = "support/parallel.rs"]
 mod parallel;

@@ -4,7 +4,7 @@
 //! the built-in clarinet in other sizes. That the running lattice is what its coefficients say is shown here for each of them, so the coefficients
 //! stand for it everywhere else.
 
-#[allow(dead_code)]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod oracle;
 #[path = "support/parallel.rs"]
 mod parallel;

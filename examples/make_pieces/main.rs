@@ -28,7 +28,10 @@ pub const PIECES: [Piece; 4] = [
     ("canon.mid", canon::file),
 ];
 
-#[allow(dead_code)] // The tests use this file as a module, to compare what it writes with what is committed.
+#[allow(
+    dead_code,
+    reason = "tests use this file as a module, to compare what it writes with what is committed"
+)]
 fn main() -> ExitCode {
     let folder = std::env::args().nth(1).unwrap_or_else(|| "examples".to_owned());
     for (name, piece) in PIECES {

@@ -1,6 +1,6 @@
 //! A host that is not there, and a moment of the instrument really played: what the editor's tests and pictures show.
 
-#![allow(dead_code)] // each user takes what it needs
+#![allow(dead_code, reason = "each user takes what it needs")]
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;

@@ -1,6 +1,5 @@
 //! The vendored reference tables, and how far something is from them.
-// Each test binary that includes this file uses its own part of it.
-#![allow(dead_code)]
+#![allow(dead_code, reason = "each user takes what it needs")]
 
 use std::collections::BTreeMap;
 use std::path::Path;

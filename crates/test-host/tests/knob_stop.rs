@@ -1,8 +1,7 @@
 //! How torque ends at a knob that the bundled CLAP has armed: the simulated knob's own log tells for how long there was any.
 //! `cargo xtask bundle` first.
 
-// This file needs only a part of what those tests share.
-#[allow(dead_code)]
+#[allow(dead_code, reason = "other tests use the rest")]
 #[path = "support/live.rs"]
 mod live;
 

@@ -107,7 +107,8 @@ pub struct HoleCoeffs {
 }
 
 impl HoleCoeffs {
-    /// Admittance of the discrete network at `z1 = z^-1`, opening `a`.
+    /// Admittance of the discrete network at `z1 = z^-1` and opening `a`, 0 (shut)..=1 (open), over that of the
+    /// nominal bore.
     pub fn admittance(&self, z1: Complex64, a: f64) -> Complex64 {
         let trapezoid = (1.0 + z1) / (1.0 - z1);
         let outside = 1.0 / (self.rs + 1.0 / (self.gl * trapezoid + self.gp));

@@ -138,8 +138,8 @@ impl BreathNoise {
         }
     }
 
-    /// A tick begins at `amount`, 0..=1, after one that ended with this flow; through a reed at rest `rest_flow` would flow. Its turbulence is [filled](Self::fill) in before its
-    /// samples, here or in a lane of [`NoiseLanes`].
+    /// A tick begins at `amount`, 0..=1, after one that ended with the flow `jet_flow`; through a reed at rest `rest_flow` would
+    /// flow, both over P / Zc. Its turbulence is [filled](Self::fill) in before its samples, here or in a lane of [`NoiseLanes`].
     pub fn begin(&mut self, amount: f64, jet_flow: f64, rest_flow: f64) {
         match self.jet {
             Jet::Steady => self.strength = amount * STEADY_NOISE,
@@ -193,7 +193,7 @@ impl BreathNoise {
         (self.random, self.high, self.low) = (random, smooth, [once, twice]);
     }
 
-    /// Noise flow of sample `at` of the tick on a jet of this flow.
+    /// Noise flow of sample `at` of the tick on a jet of this flow, both over P / Zc.
     #[inline(always)]
     pub fn flow(&mut self, jet_flow: f64, at: usize) -> f64 {
         let turbulent = ((jet_flow - self.mean).abs() - self.quiet).max(0.0);

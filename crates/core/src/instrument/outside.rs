@@ -86,7 +86,7 @@ impl<F: Real> Places<F> {
 }
 
 impl<F: Real> Outside<F> {
-    /// All in one point, silent. Allocates.
+    /// All in one point, silent. `loudness`: pressure at 1 m per change of flow in one sample, Pa. Allocates.
     pub fn new(coeffs: &LatticeCoeffs, sources: SoundSources, air: &Air, loudness: f64) -> Self {
         let rate_hz = coeffs.rate_hz;
         let reach = (Listening::longest_s(&sources, air) * rate_hz).ceil() as usize + 1;

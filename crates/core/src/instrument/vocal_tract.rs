@@ -77,13 +77,13 @@ pub struct TractState {
 }
 
 impl TractState {
-    /// Pressure that this sample's flow does not change.
+    /// Pressure over P that this sample's flow does not change.
     #[inline(always)]
     pub fn pressure(&self, coeffs: &TractCoeffs) -> f64 {
         coeffs.shared * (self.pressure - coeffs.turn * self.flow)
     }
 
-    /// One sample with this flow out of the mouth. Real-time safe. [audio thread]
+    /// One sample with this flow out of the mouth, over P / Zc. Real-time safe. [audio thread]
     #[inline(always)]
     pub fn tick(&mut self, coeffs: &TractCoeffs, flow: f64) {
         let TractCoeffs { turn, whole_turn, couple, share, .. } = *coeffs;

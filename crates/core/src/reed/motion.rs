@@ -130,8 +130,8 @@ impl ReedCoeffs {
         }
     }
 
-    /// Flow through a reed that rests: at a mouth pressure, under this force of the tongue, with no pressure in the mouthpiece. Without the
-    /// tables, within their error. Real-time safe.
+    /// Flow through a reed that rests, over P / Zc: at a mouth pressure over P, under this force of the tongue (over P, positive shuts),
+    /// with no pressure in the mouthpiece. Without the tables, within their error. Real-time safe.
     #[inline(always)]
     pub fn rest_flow(&self, p_mouth: f64, tongue: f64) -> f64 {
         let p = p_mouth.max(0.0);
@@ -193,8 +193,8 @@ impl ReedState {
         reed.swept / reed.compliance * (motion + spring)
     }
 
-    /// One sample: takes mouth pressure, the wave arriving from the bore, extra flow (noise) and the tongue's force,
-    /// and gives the wave leaving into the bore. `load` is `reed` [before](ReedCoeffs::before) the bore.
+    /// One sample: takes mouth pressure, the wave arriving from the bore and the tongue's force (positive shuts), all over P, and
+    /// extra flow (noise) over P / Zc, and gives the wave leaving into the bore, over P. `load` is `reed` [before](ReedCoeffs::before) the bore.
     /// Real-time safe; `zeta kappa B` may be anything, the solution is unique. [audio thread]
     // Called in one place, once a sample: a struct for what comes from four sides would only be taken apart again.
     #[allow(clippy::too_many_arguments)]

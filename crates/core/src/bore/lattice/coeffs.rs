@@ -108,7 +108,8 @@ impl LatticeCoeffs {
         self.holes == other.holes
     }
 
-    /// Reflectance at the tip, exactly what [`Lattice`](super::Lattice) does with fixed openings and no jets, at `f_hz`.
+    /// Reflectance at the tip, exactly what [`Lattice`](super::Lattice) does with fixed openings, 0..=1, and no jets, at `f_hz`.
+    /// `tuning_rows`: tuning delay, rows of the round trip.
     pub fn reflectance(&self, f_hz: f64, opening: &[f64], tuning_rows: f64) -> Complex64 {
         self.looking_down(0, f_hz, opening, tuning_rows)
     }

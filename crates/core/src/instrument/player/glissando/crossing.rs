@@ -138,8 +138,8 @@ impl Crossing {
         Self { rises: !self.rises, ..*self }
     }
 
-    /// One tick on the way to a place; hears the pressure in the mouthpiece. `period_s` is that of a tick on the clock of the
-    /// bore. Real-time safe.
+    /// One tick on the way to a place, cents above the lower note; hears the pressure in the mouthpiece, over the reference closing
+    /// pressure. `period_s` is that of a tick on the clock of the bore. Real-time safe.
     pub fn tick(&mut self, place: f64, pressure: f64, (tick_s, period_s): (f64, f64)) {
         if (place < self.change) != (self.place < self.change) {
             // The tract goes on from where it is, and the fingers from all holes open.
