@@ -9,6 +9,10 @@
 //! little. Meanwhile the lip damps the reed a little more, which weakens the second mode more than the first. The breath goes on: a dip of
 //! it did the same, but left a hole of 30 dB. Softer, or into the throat, the same order of the fingers would only make a bump.
 //!
+//! From the altissimo down into the clarion the old mode would go on too, for a tenth of a second and more: a third or a fifth above the new
+//! note. There the fingers are quick, and the lip damps the reed a little. Into the altissimo it lets the reed swing more freely, so that
+//! the new note grows sooner. Within the altissimo neighbours have fingerings of their own, so the fingers move as where the register changes.
+//!
 //! Leaps down into the low chalumeau by more than an octave do not arrive so: they keep the twelfth. There the lip takes nearly all of the
 //! old note away, which is heard as a light tongue.
 
@@ -37,24 +41,37 @@ const WIDE_CENTS: f64 = 1_250.0;
 const WIDE_DAMPED: LipHelp = LipHelp { damping: 6.0, length_s: 0.07 };
 /// Factor on the legato time in these. Measured with a factor of 4: at 1.8 the holes are 3 to 4 dB deeper, and as many slurs arrive.
 const WIDE_TIME: f64 = 1.0;
+/// What the lip does from the altissimo into the clarion, and the factor on the legato time. Of 630 slurs from written C#6..A6 to B4..C6 at CC 20
+/// to 127, nine tenths have arrived after 145 ms without it and 85 ms with it, and one is lost without it. At a factor of 1.6 the holes are 7 dB
+/// deeper; the peaks on the way are 1.7 dB higher at this time than at [`DOWN_TIME`] (`docs/tone.md`).
+const FROM_ALTISSIMO_DAMPED: LipHelp = LipHelp { damping: 1.3, length_s: 0.03 };
+/// See [`FROM_ALTISSIMO_DAMPED`].
+const FROM_ALTISSIMO_TIME: f64 = 0.8;
+/// Share of the time of the slur that each finger takes there. With 0.55 a tenth more take longer than 0.1 s.
+const FROM_ALTISSIMO_SHARE: f64 = 0.4;
+/// What the lip does up into the altissimo. Of 208 slurs from C5..C6 to F#6..A6, nine tenths have arrived after 235 ms without it, 175 with
+/// it, and 115 with a factor of 0.5 for 60 ms, which makes them 7 dB louder on the way than either note.
+const INTO_ALTISSIMO_DAMPED: LipHelp = LipHelp { damping: 0.7, length_s: 0.05 };
+/// Factor on the legato time of slurs down within the altissimo; up it is [`UP_TIME`]. Of 264 at this time and with overlapping fingers, nine
+/// tenths have arrived after 85 ms; with [`ACROSS_SHARE`], after 55.
+const ALTISSIMO_DOWN_TIME: f64 = 0.8;
 /// Factor on the legato time in a leap that begins at the mouth. Measured: six slurs are more than 2 dB louder on the way than either note at 1.6, none here; at 2.2 three are lost.
 const LEAP_TIME: f64 = 1.8;
 /// Factor on the legato time of a slur up over the break or into the altissimo: the shorter, the shallower the hole and the louder the click. Measured at 0.6 and
 /// 0.4: nine tenths of the holes of octaves are 10.5 and 8.6 dB deep, of all clicks 2.8 and 3.7 dB loud. Without breath nobody hurries: the
 /// keys would be heard. 294 slurs into written C#6..A6 at three velocities: nine tenths have arrived after 125 ms at 1.1, 55 at 0.4.
 const UP_TIME: f64 = 0.46;
-/// Factor on the legato time of any other slur down over the break, and of slurs from the altissimo: the old note goes on in the lengthening column, and is heard through the
+/// Factor on the legato time of any other slur down over the break, or from the altissimo into the chalumeau: the old note goes on in the lengthening column, and is heard through the
 /// holes that open. Measured at 1, 1.5 and 2.4: nine tenths of the clicks of all slurs are 3.6, 2.9 and 2.7 dB loud, and 78, 51 and 12 of 1908
-/// slurs are more than 2 dB louder on the way than either note. With a firmer throat, 10 at 2.4 and 6 at 2.8. From the altissimo, nine tenths of
-/// the peaks on the way are 4.4 dB higher than those of either note at 1.1, and 2.8 at 2.5.
+/// slurs are more than 2 dB louder on the way than either note. With a firmer throat, 10 at 2.4 and 6 at 2.8.
 const DOWN_TIME: f64 = 2.9;
 /// Factor on the legato time of slurs that do not cross the break. Measured at 1 and 1.2: slurs up within the clarion have bumps of 2.2 and 1.9
 /// dB at CC 58, and nine tenths of the holes of octaves are 9.0 and 10.3 dB deep.
 const OTHER_TIME: f64 = 1.1;
-/// Share of the time of the slur that each finger takes where the register changes: the air column then nearly always has one clear length.
+/// Share of the time of the slur that each finger takes where the register changes, and in the altissimo: the air column then nearly always has one clear length.
 /// Measured: clicks are 0.4 dB softer than with 0.5.
 const ACROSS_SHARE: f64 = 0.55;
-/// The same within a register: the fingers overlap, which clicks less.
+/// The same within another register: the fingers overlap, which clicks less.
 const WITHIN_SHARE: f64 = 0.8;
 
 /// How the fingers move.
@@ -103,7 +120,11 @@ impl Slur {
         if self.is_wide() {
             return Some(WIDE_DAMPED);
         }
-        self.is_hard(gamma).then_some(DAMPED)
+        match self.registers {
+            (3, 2) => Some(FROM_ALTISSIMO_DAMPED),
+            (1 | 2, 3) => Some(INTO_ALTISSIMO_DAMPED),
+            _ => self.is_hard(gamma).then_some(DAMPED),
+        }
     }
 
     /// What a player's fingers do at a mouth over closing pressure.
@@ -115,10 +136,17 @@ impl Slur {
                 _ if is_wide => WIDE_TIME,
                 _ if mouth_first => LEAP_TIME,
                 (1, 2) | (1 | 2, 3) if gamma > 0.0 => UP_TIME,
-                (2, 1) | (3, _) => DOWN_TIME,
+                (3, 3) if self.interval_cents > 0.0 && gamma > 0.0 => UP_TIME,
+                (3, 3) => ALTISSIMO_DOWN_TIME,
+                (3, 2) => FROM_ALTISSIMO_TIME,
+                (2 | 3, 1) => DOWN_TIME,
                 _ => OTHER_TIME,
             },
-            finger_share: if self.is_within_a_register() { WITHIN_SHARE } else { ACROSS_SHARE },
+            finger_share: match self.registers {
+                (3, 2) => FROM_ALTISSIMO_SHARE,
+                (from, to) if from == to && to < 3 => WITHIN_SHARE,
+                _ => ACROSS_SHARE,
+            },
             mouth_first,
         }
     }
@@ -142,7 +170,7 @@ mod tests {
             (slur(12.0, (1, 2), 0.1), 0.9),
             (slur(-2.0, (2, 1), -0.5), 0.9),
             (slur(-11.0, (2, 2), 0.0), 0.9),
-            (slur(-14.0, (3, 2), 0.2), 0.9),
+            (slur(-2.0, (3, 3), 0.8), 0.9),
         ];
         assert!(leap.lip_help(0.46).is_some() && leap.walk(0.6).mouth_first);
         assert!(slur(-8.0, (2, 1), -0.6).lip_help(0.51).is_some());
@@ -160,6 +188,13 @@ mod tests {
             assert!(leap.walk(0.1).mouth_first && leap.walk(0.1).time == WIDE_TIME);
             assert_eq!(slur(-13.0, registers, -0.4).lip_help(0.9), None, "into the throat");
         }
+    }
+
+    #[test]
+    fn the_lip_lets_the_reed_swing_into_the_altissimo_and_damps_it_on_the_way_back() {
+        let [up, back] = [(2, 3), (3, 2)].map(|registers| slur(5.0, registers, 0.5).lip_help(0.6));
+        assert!(up.is_some_and(|lip| lip.damping < 1.0) && back.is_some_and(|lip| lip.damping > 1.0));
+        assert!(!slur(-9.0, (3, 2), 0.2).walk(0.9).mouth_first);
     }
 
     #[test]
