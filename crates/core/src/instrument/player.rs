@@ -599,7 +599,8 @@ impl Player {
         let shaken = self.techniques.shake(gamma, note_hz * self.tuning.speed(), settings, tick_s);
         let hardness =
             self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
-        let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, &context);
+        let listens = settings.breath_response == BreathResponse::Played;
+        let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, listens.then_some(&self.ear), &context);
         let beside_cents = self.slide.as_ref().map_or(0.0, Slide::beside_cents);
         let added_cents = (sway.cents, self.inflection.cents() + beside_cents);
         let has_other_speed = self.tuning.tick(fingering, gamma, added_cents, &context, model, lattice);

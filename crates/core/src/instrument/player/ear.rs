@@ -37,6 +37,8 @@ pub struct Ear {
     power: f64,
     /// The note was slurred within its register.
     is_gentle: bool,
+    /// The pressure that was heard last, over the closing pressure, and that before it.
+    pressure: [f64; 2],
 }
 
 /// Share of the way that the ear goes in one tick of `tick_s` seconds on an instrument with this lowest note.
@@ -49,11 +51,18 @@ impl Ear {
     /// [`share`].
     pub fn hear(&mut self, pressure: f64, share: f64) {
         self.power += (pressure * pressure - self.power) * share;
+        self.pressure = [pressure, self.pressure[0]];
     }
 
     /// Amplitude now: root mean square over the closing pressure.
     pub fn amplitude(&self) -> f64 {
         self.power.sqrt()
+    }
+
+    /// Whether the pressure in the mouthpiece has just risen through zero.
+    pub fn rises_through_zero(&self) -> bool {
+        let [now, before] = self.pressure;
+        before <= 0.0 && now > 0.0
     }
 
     /// A note begins: slurred within its register, or with much to push.

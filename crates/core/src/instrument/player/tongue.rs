@@ -1,5 +1,7 @@
 //! The tongue: it holds the reed before a note, lets go, stops the note, and slaps.
 
+use super::ear::Ear;
+use super::retongued::{self, IN_TIME_S, LONGEST_WAIT_S};
 use super::{TickContext, step_towards};
 use crate::instrument::slap::{BREATH_GAMMA, Slap};
 use crate::reed::motion::TONGUE_FORCE;
@@ -24,6 +26,10 @@ enum Position {
     Away,
     /// On the reed before a note, for so many more seconds.
     Holding(f64),
+    /// On the reed until the pressure of the note before rises through zero, for so many more seconds at most.
+    Listening(f64),
+    /// On the reed in time with what rings, for so many more seconds.
+    InTime(f64),
     /// Letting go; share of the force that is left, 1..0.
     Leaving(f64),
     /// Pressing to stop a note; share of the force that is reached, 0..1.
@@ -101,7 +107,7 @@ impl Tongue {
 
     /// Whether the tongue holds the reed before a note.
     pub fn is_holding(&self) -> bool {
-        matches!(self.position, Position::Holding(_))
+        matches!(self.position, Position::Holding(_) | Position::Listening(_) | Position::InTime(_))
     }
 
     /// Whether the tongue is away from the reed and leaves it alone.
@@ -128,12 +134,18 @@ impl Tongue {
     }
 
     /// Moves the tongue. `gamma` is the mouth pressure over the closing pressure, `hardness` the factor of
-    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness). Gives the pressure at the reed's tip and
+    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness), and `ear` what the player hears who lets go in time with it, if he does. Gives the pressure at the reed's tip and
     /// the force on the reed, both over the reference closing pressure.
-    pub fn tick(&mut self, gamma: f64, hardness: f64, context: &TickContext<'_>) -> (f64, f64) {
+    pub fn tick(
+        &mut self,
+        gamma: f64,
+        hardness: f64,
+        ear: Option<&Ear>,
+        context: &TickContext<'_>,
+    ) -> (f64, f64) {
         let (tick_s, closing) = (context.tick_s, context.posture.closing);
         let free_closing = context.posture.free_closing;
-        let share = self.move_on(gamma, hardness, context);
+        let share = self.move_on(gamma, hardness, ear, context);
         let p_mouth = gamma * closing;
         let force = TONGUE_FORCE * free_closing * share;
         let Some(slap) = &mut self.slap else {
@@ -160,7 +172,7 @@ impl Tongue {
     }
 
     /// Moves on to the next position; gives the share of the full force that the position asks for.
-    fn move_on(&mut self, gamma: f64, hardness: f64, context: &TickContext<'_>) -> f64 {
+    fn move_on(&mut self, gamma: f64, hardness: f64, ear: Option<&Ear>, context: &TickContext<'_>) -> f64 {
         let tick_s = context.tick_s;
         let (position, share) = match self.position {
             Position::Resting => (Position::Resting, 1.0),
@@ -171,7 +183,17 @@ impl Tongue {
                 (if lands { Position::Stopping(0.0) } else { Position::Away }, 0.0)
             }
             Position::Holding(left_s) if left_s > tick_s => (Position::Holding(left_s - tick_s), 1.0),
-            Position::Holding(_) => (Position::Leaving(1.0), 1.0),
+            Position::Holding(_) if ear.is_some_and(retongued::rings) => {
+                (Position::Listening(LONGEST_WAIT_S), 1.0)
+            }
+            Position::Listening(_) if ear.is_some_and(Ear::rises_through_zero) => {
+                (Position::InTime(IN_TIME_S), 1.0)
+            }
+            Position::Listening(left_s) if left_s > tick_s => (Position::Listening(left_s - tick_s), 1.0),
+            Position::InTime(left_s) if left_s > tick_s => (Position::InTime(left_s - tick_s), 1.0),
+            Position::Holding(_) | Position::Listening(_) | Position::InTime(_) => {
+                (Position::Leaving(1.0), 1.0)
+            }
             Position::Leaving(share) => {
                 let share = share - tick_s * hardness / (1e-3 * f64::from(context.settings.tongue_ms));
                 if share > 0.0 { (Position::Leaving(share), share) } else { (Position::Away, 0.0) }
