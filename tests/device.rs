@@ -4,7 +4,6 @@
 #[path = "support/knob.rs"]
 mod knob;
 
-#[cfg(not(feature = "plugin"))]
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
@@ -40,8 +39,6 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// The plugin's framework brings an allocation check of its own.
-#[cfg(not(feature = "plugin"))]
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
@@ -133,7 +130,6 @@ fn a_simulated_knob_is_found_played_armed_and_left_in_peace() {
     assert!(alive > 25.0 * seconds && alive < 60.0 * seconds + 2.0, "{alive} ALIVE in {seconds} s");
 }
 
-#[cfg(not(feature = "plugin"))]
 #[test]
 fn the_audio_threads_end_allocates_nothing() {
     let (_directory, places) = places();
