@@ -136,9 +136,6 @@ fn the_highest_notes_are_as_loud_as_their_neighbours() {
     }
 }
 
-/// Of the slurs below, those that stay on a lower mode: on the bass, softly from F#5 to F6 and F#6 (written notes, CC 2).
-const LOST: [(Bundled, u8, u8, u8); 2] = [(Bundled::Bass, 78, 89, 20), (Bundled::Bass, 78, 90, 20)];
-
 /// Slurs from the clarion to written E flat 6..C7 arrive without the tongue, and wide leaps down into E4..A#4 do not fall silent.
 #[test]
 fn slurs_to_and_from_the_highest_notes_arrive() {
@@ -151,7 +148,6 @@ fn slurs_to_and_from_the_highest_notes_arrive() {
         let cases: Vec<(u8, u8, u8)> = up
             .chain(down)
             .flat_map(|(from, to)| [20, 44, 78, 112].map(|controller| (from, to, controller)))
-            .filter(|&(from, to, controller)| !LOST.contains(&(instrument, from, to, controller)))
             .collect();
         let slur = |at: usize| {
             let (from, to, controller) = cases[at];
