@@ -85,7 +85,7 @@ impl Names {
         } else {
             Some(one_of(&begin))
         };
-        let what = if self.sets { "no flag of render and no parameter" } else { "no argument" };
+        let what = if self.sets { "no flag here and no parameter" } else { "no argument" };
         Err(match near {
             Some(near) => format!("{what} is called {name:?}; do you mean {near}?"),
             None if self.sets => format!(

@@ -36,7 +36,8 @@ pub enum Event {
         /// Sounding pitch.
         note: SoundingNote,
     },
-    /// Breath from any source, 0..=1 of the full-scale mouth pressure (`Settings::breath_full_kpa`). The first one makes breath *live*.
+    /// Breath from any source, 0..=1. What it sets is `Settings::breath_response`: by default the dynamic, from where notes begin to fortissimo;
+    /// with `BreathResponse::Physical` the mouth pressure as a share of `Settings::breath_full_kpa`. The first one makes breath *live*.
     Breath(f32),
     /// The velocity of keys sets the breath again, until the next [`Breath`](Self::Breath).
     BreathFromKeys,

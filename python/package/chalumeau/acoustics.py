@@ -101,7 +101,7 @@ def thresholds(*, instrument: InstrumentLike = "b-flat", **reed: Value) -> dict[
     - ``gamma_on``: the oscillation threshold of a reed without inertia, at least 1/3;
     - ``gamma_sounding``: the dynamic threshold, where the reed as it moves under the lip begins to sound; ``sounding_hz``;
     - ``gamma_beat``: where the reed begins to touch the lay;
-    - ``gamma_off``: extinction, above which a reed that was blown shut stays silent;
+    - ``gamma_off``: extinction, where a note that sounds chokes as the pressure rises; as it falls, the note returns only lower, near 1.2;
     - ``p_req_pa``: ``gamma_on`` in Pa; and ``p_closing_pa``, one number.
 
     Takes a second. Source: the linear threshold of Wilson and Beavers (1974); extinction after the two-state model of Dalmont,

@@ -53,13 +53,14 @@ def render(
     note or ``scale="E3:C6"`` for a scale.
 
     Every flag of ``chalumeau render`` that does not name an output is an argument here, with underscores for hyphens:
-    ``seconds`` (0.01..3600), ``tail`` (s), ``gamma`` (0..3, mouth pressure over closing pressure), ``breath`` ("ramp:0:1:4"),
+    ``seconds`` (0.01..3600, 2 for one note), ``tail`` (s), ``gamma`` (0..3, mouth pressure over closing pressure; 0.5 where neither a
+    score nor another argument sets the breath), ``breath`` (the same quantity over time: one number, "ramp:0:1:4" or a CSV file),
     ``crescendo`` ("0.4:0.9"), ``no_noise=True``, ``slurred=True``, ``preset``, ``quality="high"``, ``scl``, ``unison=True`` ...
     So is every setting by its id, name or flag (see `parameters`). ``settings`` takes them as a dict, also by names with
     spaces.
 
     ``instrument`` is the clarinet in B flat unless one is chosen (see `chalumeau.instrument`). The first rendering with an
-    instrument of your own prepares it, up to a minute; the result is kept in your cache folder. ``rate`` is 1000..1536000 Hz.
+    instrument of your own, or with ``a4`` outside 430..450 Hz, prepares it, up to a minute; the result is kept in your cache folder. ``rate`` is 1000..1536000 Hz.
     ``players`` is 1..16. ``channels`` is 1 or 2; without it there are two in a room, for several players and from two places, else one,
     as the command has it.
 
@@ -80,7 +81,7 @@ def render(
     (4800,)
     >>> chalumeau.render(written="G4", strenght=3)
     Traceback (most recent call last):
-    ValueError: no flag of render and no parameter is called "strenght"; do you mean strength?
+    ValueError: no flag here and no parameter is called "strenght"; do you mean strength?
     """
     made = played(score, instrument=instrument, settings=settings, rate=rate, channels=channels, players=players, named=named)
     samples: Samples = made["samples"]

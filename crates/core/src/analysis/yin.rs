@@ -17,7 +17,7 @@ const DEEPEST: f64 = 0.3;
 
 /// Fundamental of a slice of about 1 s, Hz: the first dip of the cumulative-mean-normalised difference below 0.1, followed
 /// down to its minimum (else the deepest one, if at most 0.3), refined by a parabola on the difference. `None` if there is
-/// neither, or if the slice is too short. Allocates.
+/// neither, if the slice is too short, or if a sample or the rate is not finite. Allocates.
 ///
 /// ```
 /// use chalumeau_core::analysis::yin;
@@ -26,6 +26,9 @@ const DEEPEST: f64 = 0.3;
 /// assert!((yin::fundamental_hz(&tone, 44_100.0).unwrap() - 440.0).abs() < 0.05);
 /// ```
 pub fn fundamental_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
+    if !rate_hz.is_finite() || !samples.iter().all(|sample| sample.is_finite()) {
+        return None;
+    }
     let longest = (rate_hz / LOWEST_HZ) as usize + 2;
     let window = samples.len().checked_sub(longest).filter(|window| *window >= longest)?;
     let difference = difference(&without_mean(samples), window, longest);
@@ -94,6 +97,8 @@ mod tests {
     fn noise_and_silence_have_no_pitch() {
         assert_eq!(fundamental_hz(&noise(0.1, 44_100), 44_100.0), None);
         assert_eq!(fundamental_hz(&[0.0; 100], 44_100.0), None);
+        assert_eq!(fundamental_hz(&[f64::NAN; 44_100], 44_100.0), None);
+        assert_eq!(fundamental_hz(&[0.0; 44_100], f64::INFINITY), None);
         let clean = tone(220.0, 44_100.0, 1.0, &CLARINET_DB);
         let noisy = mix(&clean, &noise(0.02, clean.len()));
         assert!(cents(fundamental_hz(&noisy, 44_100.0).unwrap(), 220.0).abs() < 5.0);

@@ -25,7 +25,7 @@ pub struct Cylinder {
     pub notes: Vec<WrittenNote>,
     /// Semitones it sounds below what is written.
     pub transposition: i8,
-    /// Pitch of A4, Hz.
+    /// Pitch of A4, 100..=1000 Hz.
     pub a4_hz: f64,
     /// Bore, m.
     pub radius_m: f64,
@@ -61,6 +61,9 @@ pub enum CylinderError {
     /// A note, or its twelfth, that MIDI does not have.
     #[error("{0} (or its twelfth) does not sound between C-1 and G9")]
     Range(WrittenNote),
+    /// A pitch of A4 that no cylinder is built for.
+    #[error("A4 of {0} Hz; it must be 100 to 1000 Hz")]
+    A4(f64),
     /// Holes wider than the bore.
     #[error("holes of {hole_mm} mm are wider than a bore of {bore_mm} mm")]
     TooWide {
@@ -159,6 +162,9 @@ impl Cylinder {
     }
 
     fn possible(&self) -> Result<(), CylinderError> {
+        if !(100.0..=1_000.0).contains(&self.a4_hz) {
+            return Err(CylinderError::A4(self.a4_hz));
+        }
         let most = if self.vent_radius_m.is_some() { MAX_HOLES } else { MAX_HOLES + 1 };
         if self.notes.is_empty() || self.notes.len() > most {
             return Err(CylinderError::Notes { given: self.notes.len(), most });
@@ -318,6 +324,9 @@ mod tests {
         let air = Air::default();
         let message = |cylinder: Cylinder| cylinder.build(air).unwrap_err().to_string();
         assert!(message(cylinder(&[])).contains("1 to 41"));
+        for a4_hz in [0.0, -1.0, f64::NAN, 1e9] {
+            assert!(message(Cylinder { a4_hz, ..cylinder(&[50]) }).contains("100 to 1000 Hz"));
+        }
         assert!(message(cylinder(&[52, 50])).contains("D3 comes after E3"));
         assert!(message(Cylinder { transposition: 36, ..cylinder(&[30]) }).contains("F#1"));
         assert!(message(cylinder(&[0])).contains("an octave of C-1"));

@@ -1,4 +1,5 @@
-//! Extinction: the mouth pressure above which a reed that has been blown shut stays shut.
+//! Extinction: the mouth pressure at which a note that sounds chokes, because the reed stays shut. As the pressure falls again, the reed opens further
+//! down, and the note returns there.
 //!
 //! The model is Raman's two states with losses. Dalmont, Gilbert, Kergomard & Ollivier (2005) treat them with one loss for
 //! all harmonics; their result is known here from citations, and the algebra is derived here. While the reed is open, the

@@ -50,7 +50,8 @@ pub struct NoteRequirement {
     pub gamma_own: Option<f64>,
     /// Where the reed begins to touch the lay (beating); at least `gamma_sounding`.
     pub gamma_beat: f64,
-    /// Extinction: above it a reed that was blown shut stays shut and silent. At least 1.
+    /// Extinction: a note that sounds chokes there as the pressure rises, because the reed stays shut. At least 1. As the pressure falls again,
+    /// the reed stays silent until further down, near 1.2.
     pub gamma_off: f64,
 }
 
@@ -83,9 +84,10 @@ struct BoreNote {
 }
 
 impl RequirementSolver {
-    /// Analyses the bore of an instrument that plays at `a4_hz`, Hz: about one second for 46 notes. Allocates; not for the
-    /// audio thread.
+    /// Analyses the bore of an instrument that plays at `a4_hz`, 100..=1000 Hz; a value outside counts as the nearest, and one that is no
+    /// number as 440. About one second for 46 notes. Allocates; not for the audio thread.
     pub fn new(file: &InstrumentFile, air: Air, a4_hz: f64) -> Self {
+        let a4_hz = if a4_hz.is_nan() { 440.0 } else { a4_hz.clamp(100.0, 1_000.0) };
         let matrix = TransferMatrix::new(file, air);
         let sounding_hz = |written: WrittenNote| file.sounding(written).frequency_hz(a4_hz);
         let lowest_hz = sounding_hz(file.lowest());
