@@ -24,9 +24,12 @@ pub const LONGEST_WAIT_S: f64 = 0.007;
 /// with 2; of 228 from E3 to B flat 4, of 8, 1, 0, 0 and 0 (`docs/tone.md`).
 pub const IN_TIME_S: f64 = 0.0013;
 
+/// The same above which the tongue waits for it: a reed that flutters under the tongue before a first note is softer.
+const WAITS: f64 = 0.02;
+
 /// Whether the column rings so that the tongue waits for it.
 pub fn rings(ear: &Ear) -> bool {
-    ear.amplitude() > RINGS
+    ear.amplitude() > WAITS
 }
 
 /// What a player's lip does for a tongued note at a [place](super::dynamics::PlayerModel::place) after which so much still rings; `None` where
