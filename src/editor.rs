@@ -341,7 +341,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
     line.frame(Frame::new().fill(c.ground).inner_margin(Margin { left: 2, right: 10, top: 0, bottom: 0 }))
         .show(ui, |ui| {
-            if header::tabs(ui, kept, has_knob, snapshot) {
+            if header::tabs(ui, kept, has_knob, is_blind, snapshot) {
                 presets.is_open = false;
                 files.close();
             }
@@ -350,11 +350,12 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
     let is_text = hands.entry.is_some() || ui.ctx().text_edit_focused();
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, kept.names, snapshot, is_text, &mut actions));
-    let has_meter = tab != Tab::Play || is_blind;
+    // A pressure would tell one setting from another.
+    let has_meter = tab != Tab::Play && !is_blind;
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
     if has_meter {
-        line.frame(ground(8, 8)).show(ui, |ui| breath_meter::column(ui, snapshot, !is_blind));
+        line.frame(ground(8, 8)).show(ui, |ui| breath_meter::column(ui, snapshot));
     }
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
         if is_blind {

@@ -6,9 +6,6 @@ use crate::editor::snapshot::{NO_BREATH_KPA, PressureMarks, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
-/// Top of the scale of a blind comparison, kPa: the same for every setting.
-const BLIND_FULL_KPA: f32 = 10.0;
-
 /// Height of a line of small text, points.
 const LINE: f32 = 15.0;
 /// Height of a mark's two lines, points.
@@ -81,14 +78,14 @@ pub fn bands(speaks: f32, beats: f32, closes: f32, end: f32, c: &Colours) -> [(f
         .map(|(from, to, colour)| (from, to, colour.gamma_multiply(0.14)))
 }
 
-/// The column, as high as its place. A blind comparison hides the marks, because they would tell one setting from another.
-pub fn column(ui: &mut Ui, snapshot: &Snapshot, has_marks: bool) {
+/// The column, as high as its place.
+pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
-    let full = if has_marks { full_kpa(snapshot) } else { BLIND_FULL_KPA };
+    let full = full_kpa(snapshot);
     let kpa = snapshot.mouth_now_kpa();
     let marks_of = snapshot.marks();
-    let (word, colour) = if has_marks { state(&marks_of, kpa, c) } else { ("", c.quiet) };
+    let (word, colour) = state(&marks_of, kpa, c);
 
     let painter = ui.painter();
     painter.text(
@@ -110,9 +107,7 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot, has_marks: bool) {
     let speaks = marks_of.speaks_kpa.unwrap_or(marks_of.closes_kpa);
     let beats = marks_of.beats_kpa.unwrap_or(marks_of.closes_kpa).max(speaks);
     let end = marks_of.chokes_kpa.unwrap_or(full).min(full);
-    for (from, to, colour) in
-        bands(speaks, beats, marks_of.closes_kpa, end, c).into_iter().filter(|_| has_marks)
-    {
+    for (from, to, colour) in bands(speaks, beats, marks_of.closes_kpa, end, c) {
         let band = Rect::from_min_max(pos2(scale.left(), y(to)), pos2(scale.right(), y(from)));
         painter.rect_filled(band, CornerRadius::ZERO, colour);
     }
@@ -120,7 +115,7 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot, has_marks: bool) {
     painter.rect_filled(air, round, c.breath.gamma_multiply(0.85));
     painter.rect_stroke(scale, round, Stroke::new(1.0, c.line), egui::StrokeKind::Inside);
 
-    let shown: Vec<_> = marks(snapshot, c).into_iter().filter(|mark| has_marks && mark.0 <= full).collect();
+    let shown: Vec<_> = marks(snapshot, c).into_iter().filter(|mark| mark.0 <= full).collect();
     let wanted: Vec<f32> = shown.iter().map(|mark| y(mark.0)).collect();
     // The upper line of the highest stays below the unit.
     let places = text_places(&wanted, rect.top() + 24.0 + LINE + LINE);

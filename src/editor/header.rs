@@ -255,7 +255,13 @@ fn zoom(ui: &mut Ui, kept: &mut WindowState, room: Option<(f32, f32)>) {
 }
 
 /// The lower line. Whether a tab was clicked.
-pub fn tabs(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, snapshot: &Snapshot) -> bool {
+pub fn tabs(
+    ui: &mut Ui,
+    kept: &mut WindowState,
+    has_knob: bool,
+    is_blind: bool,
+    snapshot: &Snapshot,
+) -> bool {
     let mut is_clicked = false;
     let c = Colours::here(ui);
     let is_wide = ui.available_width() > 900.0;
@@ -295,7 +301,7 @@ pub fn tabs(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, snapshot: &Snap
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             laboratory(ui, kept, is_wide);
             ui.add_space(8.0);
-            lamps::draw(ui, snapshot, is_wide);
+            lamps::draw(ui, snapshot, is_wide, is_blind);
             ui.add_space(8.0);
             status(ui, snapshot);
         });

@@ -25,11 +25,14 @@ struct Held {
     at_s: f64,
 }
 
-/// Draws them from right to left, with words where there is room.
-pub fn draw(ui: &mut Ui, snapshot: &Snapshot, is_wide: bool) {
+/// Draws them from right to left, with words where there is room. A blind comparison hides the output meter, because a level would
+/// tell one setting from another.
+pub fn draw(ui: &mut Ui, snapshot: &Snapshot, is_wide: bool, is_blind: bool) {
     let c = Colours::here(ui);
     let narrow = usize::from(!is_wide);
-    meter(ui, snapshot.output_peak, METER[narrow], is_wide);
+    if !is_blind {
+        meter(ui, snapshot.output_peak, METER[narrow], is_wide);
+    }
     let source = snapshot.sources.iter().find(|source| source.is_live);
     let source = source.map_or("keys", |source| source.input.title());
     let blows = snapshot.mouth_kpa > NO_BREATH_KPA;
