@@ -10,6 +10,11 @@ pub fn hole_title(name: &str) -> String {
     hole_words(name).join(" ")
 }
 
+/// Whether the thumb covers this hole, which is at the back. Instrument files write `THUMB`.
+pub fn is_thumb(name: &str) -> bool {
+    name.eq_ignore_ascii_case("thumb")
+}
+
 fn word_of(word: &str, is_first: bool) -> String {
     match word.as_bytes() {
         [b'A'..=b'G'] => word.to_owned(),

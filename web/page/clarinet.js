@@ -26,6 +26,8 @@ const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const lit = (colour, light) => colour.map((x) => Math.round(light > 1 ? x + (255 - x) * Math.min(1, light - 1) : x * light));
 const mix = (a, b, share) => a.map((x, n) => Math.round(x + share * (b[n] - x)));
 const css = (colour, alpha = 1) => `rgb(${colour.join(' ')} / ${alpha})`;
+/** Instrument files write `THUMB`. */
+const isThumb = ({ name }) => name.toLowerCase() === 'thumb';
 
 export class ClarinetDrawing {
   constructor(canvas) {
@@ -79,7 +81,7 @@ export class ClarinetDrawing {
   /** Where a hole is drawn, pixels. */
   place(hole) {
     if (hole.kind === 'key') return [this.x(hole.x), this.axis - this.outside(hole.x) - 4];
-    return [this.x(hole.x), this.axis + (hole.name.includes('thumb') ? 0.8 * this.outside(hole.x) : 0)];
+    return [this.x(hole.x), this.axis + (isThumb(hole) ? 0.8 * this.outside(hole.x) : 0)];
   }
 
   /** The hole nearest to a point, within so many pixels; null for none. */

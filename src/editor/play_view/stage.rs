@@ -15,7 +15,7 @@ use crate::editor::alteration_editor::{AlterationEditor, Altered};
 use crate::editor::body_shape::{BEAK_M, BodyShape};
 use crate::editor::chart;
 use crate::editor::clarinet_view;
-use crate::editor::hole_names::hole_title;
+use crate::editor::hole_names::{hole_title, is_thumb};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
@@ -317,7 +317,7 @@ impl<'a> Body<'a> {
             }
             HoleKind::Finger | HoleKind::PadOpen => {
                 // The thumb is behind: its hole looks round the lower edge.
-                let low = if hole.name.contains("thumb") { 0.80 * self.outside(hole.x_m) } else { 0.0 };
+                let low = if is_thumb(&hole.name) { 0.80 * self.outside(hole.x_m) } else { 0.0 };
                 Rect::from_center_size(
                     pos2(self.x(hole.x_m), self.axis + low),
                     egui::Vec2::splat(2.0 * half + 6.0),
@@ -387,4 +387,22 @@ fn finger(painter: &Painter, c: &Colours, centre: Pos2, half: f32, presence: f32
         vec2(0.55 * size.x, 0.42 * size.y),
         colour(1.16),
     ));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_thumb_hole_is_behind_and_l1_in_front() {
+        let file = InstrumentFile::built_in();
+        let rect = Rect::from_min_size(Pos2::ZERO, vec2(1000.0, 400.0));
+        let body = Body::new(&file, rect);
+        let below_axis = |name: &str| {
+            let hole = &file.holes[file.hole(name).expect(name)];
+            body.place(hole).center().y - body.axis
+        };
+        assert_eq!(below_axis("L1"), 0.0);
+        assert!(below_axis("THUMB") > 0.3 * body.thickness(), "{}", below_axis("THUMB"));
+    }
 }
