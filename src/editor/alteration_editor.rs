@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use egui::{Align, DragValue, Layout, Response, RichText, Ui};
+use egui::{Align, DragValue, Label, Layout, Rect, Response, RichText, Ui, UiBuilder, pos2};
 
 use crate::editor::Action;
 use crate::editor::hole_names::hole_title;
@@ -19,6 +19,8 @@ use chalumeau_core::bore::pulled_joint::PulledJoint;
 const KEPT: usize = 100;
 /// Width of the line below which units lose their words, points.
 const NARROW: f32 = 640.0;
+/// Height of a row of buttons over a picture, points.
+pub const ROW: f32 = 26.0;
 /// How much wider a hole becomes where the pointer goes up by one point with Shift held, m of the radius.
 const WIDER_M: f32 = 0.05e-3;
 
@@ -133,7 +135,7 @@ impl AlterationEditor {
             if !is_shown {
                 let how = "Drag a hole along the bore; with Shift, up makes it wider. Drag a ring to pull the joint.";
                 let how = RichText::new(how).color(c.quiet);
-                ui.add(egui::Label::new(how).truncate());
+                ui.add(Label::new(how).truncate());
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if ui.button("Done").clicked() {
@@ -142,25 +144,28 @@ impl AlterationEditor {
                 self.files_and_undo(ui, snapshot, actions);
             });
         });
-        match &snapshot.saved {
-            Some(Ok(path)) => {
-                ui.horizontal(|ui| {
-                    if ui
-                        .button("Open it")
-                        .on_hover_text("Plays the saved instrument, tuned as a whole")
-                        .clicked()
-                    {
-                        actions.push(Action::OpenInstrument(path.clone()));
-                    }
-                    let told = RichText::new(format!("Saved as {}", path.display())).color(c.quiet);
-                    ui.add(egui::Label::new(told).truncate());
-                });
+    }
+
+    /// Where the altered instrument was saved or why it was not, from the right of the row at the top of `within`.
+    pub fn saved(ui: &mut Ui, within: Rect, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let Some(saved) = &snapshot.saved else { return };
+        let c = Colours::here(ui);
+        let row = Rect::from_min_max(within.min, pos2(within.right(), within.top() + ROW));
+        let layout = Layout::right_to_left(Align::Center);
+        ui.scope_builder(UiBuilder::new().max_rect(row).layout(layout), |ui| match saved {
+            Ok(path) => {
+                let about = "Plays the saved instrument, tuned as a whole";
+                if ui.button("Open it").on_hover_text(about).clicked() {
+                    actions.push(Action::OpenInstrument(path.clone()));
+                }
+                let name = path.file_name().unwrap_or(path.as_os_str()).display();
+                let told = RichText::new(format!("Saved as {name}")).color(c.ink);
+                ui.add(Label::new(told).truncate()).on_hover_text(path.display().to_string());
             }
-            Some(Err(refused)) => {
-                ui.add(egui::Label::new(RichText::new(refused).color(c.danger)).truncate());
+            Err(refused) => {
+                ui.add(Label::new(RichText::new(refused).color(c.danger)).truncate());
             }
-            None => {}
-        }
+        });
     }
 
     /// Whether something is altered, or a change can be undone.

@@ -138,6 +138,11 @@ impl ClarinetView {
                 response.on_hover_ui(|ui| about(ui, tone_hole, opening));
             }
         }
+        if self.alterations.is_open() {
+            // Left of it are words of the picture.
+            let place = Rect::from_min_max(area.min + vec2(190.0, 0.0), area.max);
+            AlterationEditor::saved(ui, place, snapshot, actions);
+        }
     }
 
     /// The rings, to be dragged.

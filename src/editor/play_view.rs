@@ -14,6 +14,7 @@ mod trail;
 use egui::{Frame, Margin, Panel, Rect, Ui, pos2, vec2};
 
 use crate::editor::Action;
+use crate::editor::alteration_editor;
 use crate::editor::alteration_editor::AlterationEditor;
 use crate::editor::controls::Hands;
 use crate::editor::snapshot::Snapshot;
@@ -98,12 +99,14 @@ impl PlayView {
             if alterations.has_changes(snapshot) {
                 let place = Rect::from_min_max(
                     rect.min + vec2(200.0, 8.0),
-                    pos2(rect.right() - 12.0, rect.top() + 34.0),
+                    pos2(rect.right() - 12.0, rect.top() + 8.0 + alteration_editor::ROW),
                 );
                 let layout = egui::Layout::right_to_left(egui::Align::Center);
                 ui.scope_builder(egui::UiBuilder::new().max_rect(place).layout(layout), |ui| {
                     alterations.files_and_undo(ui, snapshot, actions);
                 });
+                let below = place.translate(vec2(0.0, alteration_editor::ROW + 4.0));
+                AlterationEditor::saved(ui, below, snapshot, actions);
             }
             if trial.is_on() {
                 let place = Rect::from_center_size(rect.center_bottom() - vec2(0.0, 21.0), vec2(180.0, 26.0));

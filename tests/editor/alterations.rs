@@ -82,6 +82,27 @@ fn a_hole_of_the_play_view_is_dragged_and_undone() {
 }
 
 #[test]
+fn saving_is_answered_in_both_views() {
+    for tab in [Tab::Play, Tab::Clarinet] {
+        let mut window = Window::new(tab, (700.0, 480.0));
+        let hole = if tab == Tab::Play { "Hole R2, " } else { HOLE };
+        let at = window.harness.get_by_label_contains(hole).rect().center();
+        window.drag(at, vec2(-6.0, 0.0));
+        let rows = |window: &Window| {
+            window.harness.query_by_label("Fingering E3").map(|fingering| fingering.rect())
+        };
+        let before = rows(&window);
+        window.snapshot.borrow_mut().saved = Some(Ok("/home/music/mine_1.toml".into()));
+        window.harness.run();
+        window.harness.get_by_label("Saved as mine_1.toml");
+        assert_eq!(rows(&window), before, "the fingerings stay where they are");
+        window.snapshot.borrow_mut().saved = Some(Err("the folder is read only".to_owned()));
+        window.harness.run();
+        window.harness.get_by_label("the folder is read only");
+    }
+}
+
+#[test]
 fn a_hole_stays_between_its_neighbours() {
     let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
     let file = InstrumentFile::built_in();
@@ -121,7 +142,7 @@ fn a_hole_is_given_in_millimetres_and_saved() {
     let path = std::path::PathBuf::from("/home/music/mine_1.toml");
     window.snapshot.borrow_mut().saved = Some(Ok(path.clone()));
     window.harness.run();
-    window.harness.get_by_label("Saved as /home/music/mine_1.toml");
+    window.harness.get_by_label("Saved as mine_1.toml");
     click(&mut window, "Open it");
     assert_eq!(window.actions(), [Action::OpenInstrument(path)]);
     // Of another instrument nothing can be undone here, though it has the same name.
