@@ -299,7 +299,7 @@ pub fn tabs(
             response.on_hover_text(tab.about());
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            laboratory(ui, kept, is_wide);
+            laboratory(ui, kept, has_knob, is_wide);
             ui.add_space(8.0);
             lamps::draw(ui, snapshot, is_wide, is_blind);
             ui.add_space(8.0);
@@ -310,7 +310,7 @@ pub fn tabs(
 }
 
 /// Musician or laboratory.
-fn laboratory(ui: &mut Ui, kept: &mut WindowState, is_wide: bool) {
+fn laboratory(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, is_wide: bool) {
     let mut chosen = usize::from(kept.is_lab);
     let texts = [if is_wide { "Musician" } else { "Music" }, "Lab"].map(str::to_owned);
     let (place, _) = ui.allocate_exact_size(vec2(if is_wide { 132.0 } else { 92.0 }, 24.0), Sense::hover());
@@ -319,11 +319,10 @@ fn laboratory(ui: &mut Ui, kept: &mut WindowState, is_wide: bool) {
     let response = segments(&mut inside, "Views", &texts, &mut chosen);
     response.on_hover_text("Musician: what music needs. Lab: also the reed's law, torque and studies.");
     let is_lab = chosen == 1;
-    if is_lab != kept.is_lab {
-        kept.is_lab = is_lab;
-        if !is_lab && kept.tab == Tab::Reed {
-            kept.tab = Tab::Play;
-        }
+    if is_lab {
+        kept.is_lab = true;
+    } else if kept.is_lab {
+        kept.leave_lab(has_knob);
     }
 }
 

@@ -71,7 +71,16 @@ impl WindowState {
         }
     }
 
-    /// Whether a view is offered. `has_knob`: a knob is connected or chosen.
+    /// From the laboratory to the views that make music, and out of a view that is not one of them. `has_knob`: a knob is
+    /// connected or chosen.
+    pub fn leave_lab(&mut self, has_knob: bool) {
+        self.is_lab = false;
+        if self.tab == Tab::Reed || self.tab == Tab::Knob && !has_knob {
+            self.tab = Tab::Play;
+        }
+    }
+
+    /// Whether a view is offered. A view in front stays there when its knob is unplugged: its list of devices leads back to it.
     pub fn offers(&self, tab: Tab, has_knob: bool) -> bool {
         match tab {
             Tab::Reed => self.is_lab,
@@ -139,6 +148,16 @@ mod tests {
         let musician = WindowState::default();
         assert!(musician.offers(Tab::Play, false) && !musician.offers(Tab::Reed, true));
         assert!(!musician.offers(Tab::Knob, false) && musician.offers(Tab::Knob, true));
+        for (tab, has_knob, left_for) in [
+            (Tab::Reed, true, Tab::Play),
+            (Tab::Knob, false, Tab::Play),
+            (Tab::Knob, true, Tab::Knob),
+            (Tab::Sound, false, Tab::Sound),
+        ] {
+            let mut kept = WindowState { is_lab: true, tab, ..WindowState::default() };
+            kept.leave_lab(has_knob);
+            assert_eq!((kept.is_lab, kept.tab), (false, left_for), "{tab:?}, {has_knob}");
+        }
         let old = toml::from_str::<WindowState>("tab = \"reed\"").unwrap().mended();
         assert!(old.is_lab && Tab::ALL.iter().all(|&tab| old.offers(tab, false)));
     }
