@@ -3,7 +3,7 @@
 use egui::{Align2, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
 
 use crate::editor::Action;
-use crate::editor::ab_comparison::AbComparison;
+use crate::editor::ab_comparison::{AbComparison, ComparisonSide};
 use crate::editor::controls::Hands;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
@@ -22,10 +22,13 @@ pub fn draw(
     ui.vertical_centered(|ui| {
         ui.add_space(0.12 * height);
         ui.label(RichText::new("Blind comparison").font(FontId::proportional(22.0)));
-        ui.label(
-            RichText::new("Play, switch between X and Y as often as you like, decide, then press Reveal.")
-                .color(c.quiet),
-        );
+        let told = if compare.is_revealed() {
+            let [x, y] = [true, false].map(|first| compare.behind(first).name());
+            format!("X was {x}, Y was {y}. Done ends the comparison.")
+        } else {
+            "Play, switch between X and Y as often as you like, decide, then press Reveal.".to_owned()
+        };
+        ui.label(RichText::new(told).color(c.quiet));
         ui.add_space(0.06 * height);
         let size = vec2((0.3 * ui.available_width()).min(220.0), (0.3 * height).min(150.0));
         ui.horizontal(|ui| {
@@ -61,12 +64,20 @@ pub fn draw(
             }
         });
         ui.add_space(0.05 * height);
-        if !compare.is_revealed() {
-            if ui.button("Reveal").clicked() {
-                compare.reveal();
+        if compare.is_revealed() {
+            if ui.button("Done").clicked() {
+                compare.end_blind();
             }
-        } else if ui.button("Done").clicked() {
+            return;
+        }
+        if ui.button("Reveal").clicked() {
+            compare.reveal();
+        }
+        // The side that plays would be told by the letter at the top.
+        let about = "Ends the comparison on A, without telling which side was which";
+        if ui.button("Cancel").on_hover_text(about).clicked() {
             compare.end_blind();
+            compare.switch(ComparisonSide::A, hands, &snapshot.preset, actions);
         }
     });
 }

@@ -263,41 +263,20 @@ pub fn tabs(
     snapshot: &Snapshot,
 ) -> bool {
     let mut is_clicked = false;
-    let c = Colours::here(ui);
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        let offered = Tab::ALL.map(|tab| kept.offers(tab, has_knob).then_some(tab));
-        for tab in offered.into_iter().flatten() {
-            let is_here = kept.tab == tab;
-            let galley = ui.painter().layout_no_wrap(tab.name().to_owned(), theme::body(), c.ink);
-            let size = vec2(galley.size().x + if is_wide { 26.0 } else { 16.0 }, ui.available_height());
-            let (rect, response) = ui.allocate_exact_size(size, Sense::click());
-            let ink = if is_here || response.hovered() { c.ink } else { c.quiet };
-            ui.painter().text(rect.center(), Align2::CENTER_CENTER, tab.name(), theme::body(), ink);
-            if is_here {
-                let under = Rect::from_min_max(
-                    pos2(rect.left() + 6.0, rect.bottom() - 3.0),
-                    rect.right_bottom() - vec2(6.0, 0.0),
-                );
-                ui.painter().rect_filled(under, CornerRadius::same(1), c.accent);
+        // A blind comparison stands in place of every view.
+        ui.add_enabled_ui(!is_blind, |ui| {
+            ui.spacing_mut().item_spacing.x = 2.0;
+            let offered = Tab::ALL.map(|tab| kept.offers(tab, has_knob).then_some(tab));
+            for tab in offered.into_iter().flatten() {
+                if tab_button(ui, tab, kept.tab == tab, is_wide).clicked() {
+                    kept.tab = tab;
+                    is_clicked = true;
+                }
             }
-            if response.has_focus() {
-                let round = CornerRadius::same(theme::SMALL_RADIUS);
-                ui.painter().rect_stroke(
-                    rect.shrink(2.0),
-                    round,
-                    Stroke::new(1.0, c.accent),
-                    egui::StrokeKind::Inside,
-                );
-            }
-            response.widget_info(|| WidgetInfo::selected(Role::Tab, true, is_here, tab.name()));
-            if response.clicked() {
-                kept.tab = tab;
-                is_clicked = true;
-            }
-            response.on_hover_text(tab.about());
-        }
+        });
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             laboratory(ui, kept, has_knob, is_wide);
             ui.add_space(8.0);
@@ -307,6 +286,34 @@ pub fn tabs(
         });
     });
     is_clicked
+}
+
+fn tab_button(ui: &mut Ui, tab: Tab, is_here: bool, is_wide: bool) -> egui::Response {
+    let c = Colours::here(ui);
+    let galley = ui.painter().layout_no_wrap(tab.name().to_owned(), theme::body(), c.ink);
+    let size = vec2(galley.size().x + if is_wide { 26.0 } else { 16.0 }, ui.available_height());
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    let ink = if is_here || response.hovered() { c.ink } else { c.quiet };
+    ui.painter().text(rect.center(), Align2::CENTER_CENTER, tab.name(), theme::body(), ink);
+    if is_here {
+        let under = Rect::from_min_max(
+            pos2(rect.left() + 6.0, rect.bottom() - 3.0),
+            rect.right_bottom() - vec2(6.0, 0.0),
+        );
+        ui.painter().rect_filled(under, CornerRadius::same(1), c.accent);
+    }
+    if response.has_focus() {
+        let round = CornerRadius::same(theme::SMALL_RADIUS);
+        ui.painter().rect_stroke(
+            rect.shrink(2.0),
+            round,
+            Stroke::new(1.0, c.accent),
+            egui::StrokeKind::Inside,
+        );
+    }
+    let is_enabled = ui.is_enabled();
+    response.widget_info(|| WidgetInfo::selected(Role::Tab, is_enabled, is_here, tab.name()));
+    response.on_hover_text(tab.about())
 }
 
 /// Musician or laboratory.

@@ -58,9 +58,35 @@ fn a_and_b_keep_their_settings_and_blind_hides_them() {
         })
         .collect();
     assert_eq!(heard.len(), 2, "X and Y are not the same");
+    let tab = |window: &Window| {
+        window.harness.get_by_role_and_label(Role::Tab, "Sound").accesskit_node().is_disabled()
+    };
+    assert!(tab(&window), "no view can be chosen");
     click(&mut window, "Reveal");
+    let side_of_x = if window.harness.query_by_label_contains("X was A, Y was B.").is_some() { "A" } else { "B" };
+    let side_of_y = if side_of_x == "A" { "B" } else { "A" };
+    let told = format!("X was {side_of_x}, Y was {side_of_y}. Done ends the comparison.");
+    window.harness.get_by_label(&told);
+    assert!(!tells(&window, "Reveal"));
     click(&mut window, "Done");
     window.harness.get_by_label("Lip opening");
+    assert!(!tab(&window));
+}
+
+/// On A, whichever side played: the letter at the top would tell.
+#[test]
+fn a_cancelled_comparison_tells_nothing() {
+    let mut window = Window::tall(Tab::Reed);
+    click(&mut window, "Setting B");
+    window.host.automate("lip", 0.9);
+    window.harness.run();
+    for side in ["Side X", "Side Y"] {
+        click(&mut window, "Blind");
+        click(&mut window, side);
+        click(&mut window, "Cancel");
+        assert!(window.harness.query_by_label_contains("X was").is_none());
+        assert_eq!(window.host.value("lip"), 0.5, "A, after {side}");
+    }
 }
 
 /// The lot falls anew each time: a side that stayed would be named X half of the time only.
