@@ -87,7 +87,7 @@ fn saving_is_answered_in_both_views() {
         let mut window = Window::new(tab, (700.0, 480.0));
         let hole = if tab == Tab::Play { "Hole R2, " } else { HOLE };
         let at = window.harness.get_by_label_contains(hole).rect().center();
-        window.drag(at, vec2(-6.0, 0.0));
+        window.drag(at, vec2(-12.0, 0.0));
         let rows = |window: &Window| {
             window.harness.query_by_label("Fingering E3").map(|fingering| fingering.rect())
         };
