@@ -38,25 +38,72 @@ pub fn tools(
         if is_wide && !compare.is_blind() {
             pitch_needle::needle(ui, snapshot, 150.0);
         }
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.spacing_mut().item_spacing.x = 5.0;
-            ui.spacing_mut().button_padding.x = if is_wide { 8.0 } else { 6.0 };
-            momentary(ui, hands, "panic", "Panic");
-            zoom(ui, kept, snapshot.room);
-            let word = if kept.is_dark { "Light theme" } else { "Dark theme" };
-            if icon(ui, Icon::Theme, word).on_hover_text(word).clicked() {
-                kept.is_dark = !kept.is_dark;
-            }
-            ui.add_space(4.0);
-            sides(ui, compare, hands, snapshot, actions, is_wide);
-            ui.add_space(4.0);
-            // Undo would tell what was set, and on which side.
-            if !compare.is_blind() {
-                undo(ui, hands, actions);
-                preset_bar::bar(ui, presets, hands, snapshot, actions);
-            }
-        });
+        ui.spacing_mut().item_spacing.x = 5.0;
+        ui.spacing_mut().button_padding.x = if is_wide { 8.0 } else { 6.0 };
+        let is_blind = compare.is_blind();
+        with_tools_at_right(
+            ui,
+            (hands, actions),
+            |ui, (hands, actions)| {
+                if !is_blind {
+                    preset_bar::bar(ui, presets, hands, snapshot, actions);
+                }
+            },
+            |ui, (hands, actions)| {
+                // Undo would tell what was set, and on which side.
+                if !is_blind {
+                    undo(ui, hands, actions);
+                }
+                ui.add_space(4.0);
+                sides(ui, compare, hands, snapshot, actions, is_wide);
+                ui.add_space(4.0);
+                let word = if kept.is_dark { "Light theme" } else { "Dark theme" };
+                if icon(ui, Icon::Theme, word).on_hover_text(word).clicked() {
+                    kept.is_dark = !kept.is_dark;
+                }
+                zoom(ui, kept, snapshot.room);
+                momentary(ui, hands, "panic", "Panic");
+            },
+        );
     });
+}
+
+/// Tools that end at the right, and what fills the room left of them. Both are laid out from left to right, because the Tab key
+/// goes from widget to widget in the order in which they were added. `with` is lent to one after the other.
+fn with_tools_at_right<A>(
+    ui: &mut Ui,
+    mut with: A,
+    rest: impl FnOnce(&mut Ui, &mut A),
+    tools: impl FnOnce(&mut Ui, &mut A),
+) {
+    let id = ui.scope_id().with("width of the tools");
+    let known = ui.data(|data| data.get_temp::<f32>(id));
+    let all = ui.available_rect_before_wrap();
+    let left = (all.right() - known.unwrap_or(0.0)).max(all.left());
+    let gap = ui.spacing().item_spacing.x;
+    let inside = |from: f32, to: f32| {
+        let place = Rect::from_x_y_ranges(from..=to.max(from), all.y_range());
+        egui::UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center))
+    };
+    ui.scope_builder(inside(all.left(), left - gap), |ui| rest(ui, &mut with));
+    let used = ui.scope_builder(inside(left, all.right()), |ui| {
+        tools(ui, &mut with);
+        ui.min_rect().width()
+    });
+    // The width is known once they are laid out: the first time, and when a text has changed, they are laid out again.
+    if known.is_none_or(|known| (known - used.inner).abs() > 0.5) {
+        ui.data_mut(|data| data.insert_temp(id, used.inner));
+        ui.ctx().request_discard("the width of the tools was not known");
+    }
+}
+
+/// A ring around a button with the focus, which is seen on a selected one too.
+fn focus_ring(ui: &Ui, response: &egui::Response) {
+    if response.has_focus() {
+        let round = CornerRadius::same(theme::SMALL_RADIUS + 1);
+        let stroke = Stroke::new(2.0, Colours::here(ui).ink);
+        ui.painter().rect_stroke(response.rect.expand(2.0), round, stroke, egui::StrokeKind::Inside);
+    }
 }
 
 fn named(response: egui::Response, name: &str) -> egui::Response {
@@ -164,19 +211,19 @@ fn undo(ui: &mut Ui, hands: &mut Hands, actions: &mut Vec<Action>) {
         actions.extend(preset.map(Action::ChosePreset));
     };
     let (undoable, redoable) = (name(hands, hands.history.undoable()), name(hands, hands.history.redoable()));
-    ui.add_enabled_ui(redoable.is_some(), |ui| {
-        let response = icon(ui, Icon::Redo, "Redo");
-        let response = response.on_hover_text(format!("Redo {}", redoable.clone().unwrap_or_default()));
-        if response.clicked() {
-            let restored = hands.history.redo();
-            restore(hands, restored);
-        }
-    });
     ui.add_enabled_ui(undoable.is_some(), |ui| {
         let response = icon(ui, Icon::Undo, "Undo");
         let response = response.on_hover_text(format!("Undo {}", undoable.clone().unwrap_or_default()));
         if response.clicked() {
             let restored = hands.history.undo();
+            restore(hands, restored);
+        }
+    });
+    ui.add_enabled_ui(redoable.is_some(), |ui| {
+        let response = icon(ui, Icon::Redo, "Redo");
+        let response = response.on_hover_text(format!("Redo {}", redoable.clone().unwrap_or_default()));
+        if response.clicked() {
+            let restored = hands.history.redo();
             restore(hands, restored);
         }
     });
@@ -203,12 +250,18 @@ fn sides(
     } else {
         None
     };
-    let blind = ui.add_enabled(why_not.is_none(), egui::Button::new("Blind"));
-    let blind = blind
-        .on_hover_text("Compare without knowing which is which: A and B appear as X and Y in random order");
-    if blind.on_disabled_hover_text(why_not.unwrap_or_default()).clicked() {
-        compare.hide();
-        compare.switch(compare.behind(true), hands, &snapshot.preset, actions);
+    for side in [ComparisonSide::A, ComparisonSide::B] {
+        let (name, is_here) = (side.name(), compare.side == side);
+        let button = egui::Button::selectable(is_here, format!(" {name} ")).frame_when_inactive(true);
+        let response = ui.add(button);
+        focus_ring(ui, &response);
+        response.widget_info(|| {
+            WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Setting {name}"))
+        });
+        if response.on_hover_text(format!("Setting {name}: change it, and switch between A and B")).clicked()
+        {
+            compare.switch(side, hands, &snapshot.preset, actions);
+        }
     }
     let (text, other) = match compare.side {
         ComparisonSide::A if is_wide => ("A to B", "B"),
@@ -220,17 +273,12 @@ fn sides(
     if copy.on_hover_text(format!("Copies the settings you hear now to {other}")).clicked() {
         compare.copy(hands, &snapshot.preset);
     }
-    for side in [ComparisonSide::B, ComparisonSide::A] {
-        let (name, is_here) = (side.name(), compare.side == side);
-        let button = egui::Button::selectable(is_here, format!(" {name} ")).frame_when_inactive(true);
-        let response = ui.add(button);
-        response.widget_info(|| {
-            WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Setting {name}"))
-        });
-        if response.on_hover_text(format!("Setting {name}: change it, and switch between A and B")).clicked()
-        {
-            compare.switch(side, hands, &snapshot.preset, actions);
-        }
+    let blind = ui.add_enabled(why_not.is_none(), egui::Button::new("Blind"));
+    let blind = blind
+        .on_hover_text("Compare without knowing which is which: A and B appear as X and Y in random order");
+    if blind.on_disabled_hover_text(why_not.unwrap_or_default()).clicked() {
+        compare.hide();
+        compare.switch(compare.behind(true), hands, &snapshot.preset, actions);
     }
 }
 

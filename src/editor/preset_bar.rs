@@ -38,7 +38,7 @@ pub fn bar(
     ui.painter().rect_filled(rect, CornerRadius::same(theme::SMALL_RADIUS), c.raised);
 
     let (shelf, name) = (&snapshot.presets, snapshot.preset.as_str());
-    for by in [-1_isize, 1] {
+    let step = |ui: &Ui, by: isize, hands: &mut Hands, actions: &mut Vec<Action>| {
         let x = if by < 0 { rect.left() } else { rect.right() - ARROW };
         let place = Rect::from_min_size(pos2(x, rect.top()), vec2(ARROW, rect.height()));
         let word = if by < 0 { "Previous preset" } else { "Next preset" };
@@ -49,9 +49,24 @@ pub fn bar(
         {
             choose(preset, &snapshot.preset, hands, actions);
         }
-    }
+    };
+    // In the order of the Tab key.
+    step(ui, -1, hands, actions);
+    name_button(ui, rect.shrink2(vec2(ARROW, 0.0)), browser, hands, snapshot, actions);
+    step(ui, 1, hands, actions);
+}
 
-    let middle = rect.shrink2(vec2(ARROW, 0.0));
+/// The name of the preset with its tags, which opens the browser.
+fn name_button(
+    ui: &Ui,
+    middle: Rect,
+    browser: &mut PresetBrowser,
+    hands: &Hands,
+    snapshot: &Snapshot,
+    actions: &mut Vec<Action>,
+) {
+    let c = Colours::here(ui);
+    let (shelf, name) = (&snapshot.presets, snapshot.preset.as_str());
     let response = ui.interact(middle, ui.scope_id().with("preset"), Sense::click());
     frame(ui, middle, &response, browser.is_open);
     let preset = shelf.find(name);

@@ -432,6 +432,25 @@ fn every_control_is_reached_by_the_tab_key() {
     }
 }
 
+/// As the eye goes: along the line of tools, from the left to the right.
+#[test]
+fn the_tab_key_goes_through_the_tools_from_left_to_right() {
+    for size in [(1100.0, 720.0), (700.0, 480.0)] {
+        let mut window = Window::new(Tab::Play, size);
+        let mut passed = Vec::new();
+        loop {
+            window.harness.key_press(Key::Tab);
+            window.harness.run();
+            let focused = window.harness.root().children_recursive().find(|node| node.is_focused()).unwrap();
+            if focused.rect().center().y > 44.0 {
+                break;
+            }
+            passed.push((focused.rect().center().x, focused.accesskit_node().label().unwrap_or_default()));
+        }
+        assert!(passed.len() > 6 && passed.is_sorted_by(|a, b| a.0 < b.0), "{size:?}: {passed:?}");
+    }
+}
+
 /// Frames that an idle window asks for in `seconds`, after two to settle: a clock that runs only when it is asked for.
 fn frames_asked_for(window: &mut Window, seconds: f64) -> usize {
     let mut count = 0;
