@@ -1,4 +1,5 @@
-//! The keyboard: the range of the instrument, named by written or sounding notes; and the key switches at its left, if there are
+//! The keyboard: the range of the instrument. The C of each octave has its name, and a held key the name of the note it plays, written
+//! or sounding; and the key switches at its left, if there are
 //! any. A press lower on a key is louder.
 //! Sliding from key to key slurs: the new note starts before the old one ends. With the keyboard focus, the arrow keys
 //! choose a note, and Space plays it while it is held. In a window without a host, [letters](typed_letters) play too.
@@ -23,10 +24,7 @@ use typed_letters::TypedLetters;
 /// Velocity of a note played with Space or a letter.
 const PLAIN: f32 = 0.75;
 
-/// A white key this wide has room for every name, such as G#4.
-const NAME_WIDTH: f32 = 30.0;
-
-const HELP: &str = "The keys have the names of the notes they play, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
+const HELP: &str = "A key that is held shows the note it plays, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
 const LETTERS_HELP: &str =
     "The letters on the keys play them, too. Page Up and Page Down move the letters by an octave.";
 const SWITCH_KEY: &str = "This key makes no sound: the notes that follow take these fingerings, until another key of the row is struck. The colour shows which. *Key switches* in the Breath view moves the row.";
@@ -231,7 +229,7 @@ impl Keys {
         Some((note, 0.35 + 0.65 * down))
     }
 
-    /// Paints them; `named` gives the note that a key is named by, `None` for a silent one; `letter` what is typed to play it.
+    /// Paints them; `named` gives the note that a held key is named by, `None` for a silent one; `letter` what is typed to play it.
     fn paint(
         &self,
         ui: &Ui,
@@ -286,11 +284,11 @@ impl Keys {
             let place = pos2(key.center().x - 0.5 * words.size().x, key.bottom() - low - words.size().y);
             painter.galley(place, words, ink);
         }
-        // The names of white keys, one an octave where keys are too narrow; and that of a key held down.
+        // A C has the name that every keyboard gives it; a key that is held has the name of the note it plays.
         for note in self.from..=self.to {
             let (key, is_down) = (self.key(note), down.contains(&Some(note)));
-            let has_name = note % 12 == 0 || !is_black(note) && key.width() >= NAME_WIDTH || is_down;
-            let Some(name) = named(note).filter(|_| has_name) else { continue };
+            let name = if is_down { named(note) } else { (note % 12 == 0).then_some(note) };
+            let Some(name) = name else { continue };
             let ink = if is_down { c.on_accent } else { ON_IVORY };
             let words = painter.layout_no_wrap(note_name(name), theme::small(), ink);
             let left = (key.center().x - 0.5 * words.size().x)

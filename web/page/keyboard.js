@@ -76,6 +76,7 @@ export class Keyboard {
       key.classList.toggle('silent', this.silent.has(note) || note < this.first || note > this.last);
       const letter = this.letters.get(note);
       if (letter) key.append(Object.assign(document.createElement('kbd'), { textContent: letter }));
+      // A C has the name that every keyboard gives it, as in the plugin's window.
       const name = note % 12 === 0 ? noteName(note) : '';
       if (!black) key.append(Object.assign(document.createElement('i'), { textContent: name }));
       this.keys.set(note, key);
