@@ -16,6 +16,7 @@ mod chart;
 mod clarinet_drawing;
 mod clarinet_view;
 pub mod controls;
+mod dynamic_meter;
 pub mod feel_test;
 mod file_browser;
 pub mod fingering_search;
@@ -64,6 +65,7 @@ pub use window_state::{LEAST_SIZE, SIZE, WindowState, ZOOM};
 
 use chalumeau_core::bore::alterations::Alterations;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::BreathResponse;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
@@ -355,7 +357,11 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
     if has_meter {
-        line.frame(ground(8, 8)).show(ui, |ui| breath_meter::column(ui, snapshot));
+        // Pressures are for a laboratory, and for who has chosen to blow them.
+        let is_pressure = kept.is_lab || snapshot.settings.breath_response == BreathResponse::Physical;
+        line.frame(ground(8, 8)).show(ui, |ui| {
+            if is_pressure { breath_meter::column(ui, snapshot) } else { dynamic_meter::draw(ui, snapshot) }
+        });
     }
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
         if is_blind {

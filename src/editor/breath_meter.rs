@@ -1,4 +1,4 @@
-//! The breath meter, which is always in sight: mouth pressure as a column, with the pressures that matter for this note.
+//! The breath meter of a laboratory: mouth pressure as a column, with the pressures that matter for this note.
 
 use egui::{Align2, Color32, CornerRadius, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 

@@ -4,7 +4,6 @@
 //! light in the holes that sound comes out of. On its left stands the breath in a musician's words, below it the main controls
 //! and the last ten seconds. A click on a hole opens or closes it for a trial and a drag moves it, as in the clarinet view.
 
-mod dynamic_meter;
 mod lit_body;
 mod macro_knob;
 mod motion;
@@ -17,6 +16,7 @@ use crate::editor::Action;
 use crate::editor::alteration_editor;
 use crate::editor::alteration_editor::AlterationEditor;
 use crate::editor::controls::Hands;
+use crate::editor::dynamic_meter;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP};

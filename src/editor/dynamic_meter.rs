@@ -1,4 +1,5 @@
-//! How hard the player blows, in a musician's words: from where the note speaks to fortissimo.
+//! How hard the player blows, in a musician's words: from where the note speaks to fortissimo. The Play view has it at its left, and
+//! for a musician the other views at their right.
 
 use egui::{
     Align2, Color32, CornerRadius, FontId, Mesh, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
