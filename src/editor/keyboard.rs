@@ -1,6 +1,5 @@
-//! The keyboard: the range of the instrument. The C of each octave has its name, and a held key the name of the note it plays, written
-//! or sounding; and the key switches at its left, if there are
-//! any. A press lower on a key is louder.
+//! The keyboard: the range of the instrument; and the key switches at its left, if there are any. The C of each octave has its name,
+//! and a held key the name of the note it plays, written or sounding. A press lower on a key is louder.
 //! Sliding from key to key slurs: the new note starts before the old one ends. With the keyboard focus, the arrow keys
 //! choose a note, and Space plays it while it is held. In a window without a host, [letters](typed_letters) play too.
 
@@ -8,8 +7,8 @@ mod switch_row;
 mod typed_letters;
 
 use egui::{
-    Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
-    vec2,
+    Align2, Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo,
+    pos2, vec2,
 };
 
 use crate::editor::Action;
@@ -23,6 +22,9 @@ use typed_letters::TypedLetters;
 
 /// Velocity of a note played with Space or a letter.
 const PLAIN: f32 = 0.75;
+
+/// Width of the sign left of the keys that tells how to play them, points.
+const HELP_MARK: f32 = 14.0;
 
 const HELP: &str = "A key that is held shows the note it plays, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
 const LETTERS_HELP: &str =
@@ -67,7 +69,11 @@ impl Keyboard {
         // From a white key to a white key.
         let from = if is_black(lowest.0) { lowest.0.saturating_sub(1) } else { lowest.0 };
         let to = if is_black(highest.0) { highest.0 + 1 } else { highest.0 };
-        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        let all = ui.available_rect_before_wrap();
+        let (mark, all) = all.split_left_right_at_x(all.left() + HELP_MARK);
+        help_mark(ui, mark, self.letters.is_some());
+        let response = ui.allocate_rect(all, Sense::click_and_drag());
+        let rect = response.rect;
         let switches = snapshot.settings.reach.key_switches;
         let (row, rect) = SwitchRow::beside(switches, rect);
         let keys = Keys::new(rect, from, to);
@@ -112,12 +118,13 @@ impl Keyboard {
             let pointed = response.hover_pos().and_then(at).map(|(note, _)| note);
             match pointed.map(|note| (chooses(note), playable(note))) {
                 Some((Some(fingerings), _)) => {
-                    response.on_hover_text(format!("Key switch, {fingerings}. {SWITCH_KEY}"))
+                    response.on_hover_text_at_pointer(format!("Key switch, {fingerings}. {SWITCH_KEY}"));
                 }
-                Some((None, false)) => response.on_hover_text(SILENT_KEY),
-                _ if self.letters.is_some() => response.on_hover_text(format!("{HELP} {LETTERS_HELP}")),
-                _ => response.on_hover_text(HELP),
-            };
+                Some((None, false)) => {
+                    response.on_hover_text_at_pointer(SILENT_KEY);
+                }
+                _ => {}
+            }
         }
     }
 
@@ -173,6 +180,17 @@ impl Keyboard {
             self.hold(None, actions);
         }
     }
+}
+
+/// The sign left of the keys that tells how to play them.
+fn help_mark(ui: &Ui, rect: Rect, has_letters: bool) {
+    let c = Colours::here(ui);
+    let response = ui.interact(rect, ui.scope_id().with("help"), Sense::hover());
+    let ink = if response.hovered() { c.ink } else { c.quiet };
+    ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, "?", theme::body(), ink);
+    let about = if has_letters { format!("{HELP} {LETTERS_HELP}") } else { HELP.to_owned() };
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &about));
+    response.on_hover_text(&about);
 }
 
 /// Names and letters on white keys.

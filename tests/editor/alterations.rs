@@ -88,9 +88,8 @@ fn saving_is_answered_in_both_views() {
         let hole = if tab == Tab::Play { "Hole R2, " } else { HOLE };
         let at = window.harness.get_by_label_contains(hole).rect().center();
         window.drag(at, vec2(-12.0, 0.0));
-        let rows = |window: &Window| {
-            window.harness.query_by_label("Fingering E3").map(|fingering| fingering.rect())
-        };
+        let rows =
+            |window: &Window| window.harness.query_by_label("Fingering E3").map(|fingering| fingering.rect());
         let before = rows(&window);
         window.snapshot.borrow_mut().saved = Some(Ok("/home/music/mine_1.toml".into()));
         window.harness.run();

@@ -48,7 +48,10 @@ fn a_and_b_keep_their_settings_and_blind_hides_them() {
     assert!(window.harness.query_by_label_contains("Hz").is_none());
     assert!(window.harness.query_by_label_contains("Pitch").is_none());
     let tells = |window: &Window, part: &str| window.harness.query_by_label_contains(part).is_some();
-    assert!(!tells(&window, "Mouth pressure") && !tells(&window, "kPa"), "pressures differ between the sides");
+    assert!(
+        !tells(&window, "Mouth pressure") && !tells(&window, "kPa"),
+        "pressures differ between the sides"
+    );
     assert!(!tells(&window, "Output"), "levels differ between the sides");
     let heard: BTreeSet<String> = ["Side X", "Side Y"]
         .into_iter()
@@ -63,7 +66,8 @@ fn a_and_b_keep_their_settings_and_blind_hides_them() {
     };
     assert!(tab(&window), "no view can be chosen");
     click(&mut window, "Reveal");
-    let side_of_x = if window.harness.query_by_label_contains("X was A, Y was B.").is_some() { "A" } else { "B" };
+    let side_of_x =
+        if window.harness.query_by_label_contains("X was A, Y was B.").is_some() { "A" } else { "B" };
     let side_of_y = if side_of_x == "A" { "B" } else { "A" };
     let told = format!("X was {side_of_x}, Y was {side_of_y}. Done ends the comparison.");
     window.harness.get_by_label(&told);
