@@ -23,6 +23,9 @@ use typed_letters::TypedLetters;
 /// Velocity of a note played with Space or a letter.
 const PLAIN: f32 = 0.75;
 
+/// Least height at which a key shows both its letter and its name, points. On a lower one the letter has the place of the name.
+const ROOM_FOR_BOTH: f32 = 80.0;
+
 /// Width of the sign left of the keys that tells how to play them, points.
 const HELP_MARK: f32 = 14.0;
 
@@ -288,9 +291,11 @@ impl Keys {
                 }
             }
         }
-        for note in (self.from..=self.to).filter(|&note| named(note).is_some()) {
-            let Some(letter) = letter(note) else { continue };
+        let is_low = self.rect.height() < ROOM_FOR_BOTH;
+        let letter = |note: u8| letter(note).filter(|_| named(note).is_some());
+        for note in self.from..=self.to {
             let (key, is_down) = (self.key(note), down.contains(&Some(note)));
+            let Some(letter) = letter(note).filter(|_| !(is_low && is_down)) else { continue };
             let ink = match (is_down, is_black(note)) {
                 (true, _) => c.on_accent,
                 (_, true) => c.ivory,
@@ -298,14 +303,22 @@ impl Keys {
             };
             let words = painter.layout_no_wrap(letter.to_owned(), theme::small(), ink);
             // Clear of the names below, and on a white key of the black ones above.
-            let low = if is_black(note) && !is_down { 4.0 } else { 18.0 };
+            let low = match is_black(note) && !is_down {
+                true => 4.0,
+                false if is_low => 3.0,
+                false => 18.0,
+            };
             let place = pos2(key.center().x - 0.5 * words.size().x, key.bottom() - low - words.size().y);
             painter.galley(place, words, ink);
         }
         // A C has the name that every keyboard gives it; a key that is held has the name of the note it plays.
         for note in self.from..=self.to {
             let (key, is_down) = (self.key(note), down.contains(&Some(note)));
-            let name = if is_down { named(note) } else { (note % 12 == 0).then_some(note) };
+            let name = match is_down {
+                true => named(note),
+                false if is_low && letter(note).is_some() => None,
+                false => (note % 12 == 0).then_some(note),
+            };
             let Some(name) = name else { continue };
             let ink = if is_down { c.on_accent } else { ON_IVORY };
             let words = painter.layout_no_wrap(note_name(name), theme::small(), ink);
