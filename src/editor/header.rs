@@ -266,8 +266,8 @@ fn sides(
     let (text, other) = match compare.side {
         ComparisonSide::A if is_wide => ("A to B", "B"),
         ComparisonSide::B if is_wide => ("B to A", "A"),
-        ComparisonSide::A => (">", "B"),
-        ComparisonSide::B => ("<", "A"),
+        ComparisonSide::A => ("to B", "B"),
+        ComparisonSide::B => ("to A", "A"),
     };
     let copy = named(ui.button(text), &format!("Copy to {other}"));
     if copy.on_hover_text(format!("Copies the settings you hear now to {other}")).clicked() {
@@ -326,7 +326,7 @@ pub fn tabs(
             }
         });
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            laboratory(ui, kept, has_knob, is_wide);
+            laboratory(ui, kept, has_knob);
             ui.add_space(8.0);
             lamps::draw(ui, snapshot, is_wide, is_blind);
             ui.add_space(8.0);
@@ -365,10 +365,10 @@ fn tab_button(ui: &mut Ui, tab: Tab, is_here: bool, is_wide: bool) -> egui::Resp
 }
 
 /// Musician or laboratory.
-fn laboratory(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, is_wide: bool) {
+fn laboratory(ui: &mut Ui, kept: &mut WindowState, has_knob: bool) {
     let mut chosen = usize::from(kept.is_lab);
-    let texts = [if is_wide { "Musician" } else { "Music" }, "Lab"].map(str::to_owned);
-    let (place, _) = ui.allocate_exact_size(vec2(if is_wide { 132.0 } else { 92.0 }, 24.0), Sense::hover());
+    let texts = ["Musician", "Lab"].map(str::to_owned);
+    let (place, _) = ui.allocate_exact_size(vec2(132.0, 24.0), Sense::hover());
     let mut inside =
         ui.new_child(egui::UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center)));
     let response = segments(&mut inside, "Views", &texts, &mut chosen);
