@@ -11,6 +11,7 @@ use crate::editor::controls::{momentary, segments};
 use crate::editor::lamps;
 use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::pitch_needle;
+use crate::editor::pitch_needle::NO_SOUND;
 use crate::editor::preset_bar;
 use crate::editor::preset_browser::PresetBrowser;
 use crate::editor::snapshot::{Severity, Snapshot, Status};
@@ -159,7 +160,14 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(vec2(150.0, ui.available_height()), Sense::click());
     let transposition = snapshot.instrument.transposition;
-    let named = |names: NoteNames| snapshot.written().and_then(|note| names.of_written(note, transposition));
+    // The fingering in place before the first note is nobody's note.
+    let has_played = ui.data_mut(|data| {
+        let has_played = data.get_temp_mut_or_default::<bool>(response.id);
+        *has_played |= snapshot.sounding.is_some();
+        *has_played
+    });
+    let note = snapshot.written().filter(|_| has_played);
+    let named = |names: NoteNames| note.and_then(|note| names.of_written(note, transposition));
     let painter = ui.painter();
     let ink = if snapshot.sounding.is_some() { c.ink } else { c.quiet };
     let big = named(kept.names).map_or_else(|| "\u{2013}".into(), note_name);
@@ -179,10 +187,13 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
         named(kept.names.other()).map_or_else(String::new, |note| format!("{verb} {}", note_name(note)));
     let ink = if response.hovered() { c.ink } else { c.quiet };
     painter.text(pos2(x, rect.center().y - 1.0), Align2::LEFT_BOTTOM, &other, theme::small(), ink);
-    let pitch = snapshot.heard.f0_hz.map_or_else(|| "silent".into(), |hz| format!("{hz:.1} Hz"));
-    let pitch = if has_pitch { pitch } else { String::new() };
+    let pitch = snapshot.heard.f0_hz.map_or_else(|| NO_SOUND.to_owned(), |hz| format!("{hz:.1} Hz"));
+    let pitch = if has_pitch && has_played { pitch } else { String::new() };
     painter.text(pos2(x, rect.center().y + 1.0), Align2::LEFT_TOP, &pitch, theme::small(), c.quiet);
-    let said = format!("{} {big}, {other}, {pitch}", kept.names.title());
+    let said = match has_played {
+        true => format!("{} {big}, {other}, {pitch}", kept.names.title()),
+        false => format!("{}, no note yet", kept.names.title()),
+    };
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &said));
     if response.clicked() {
         kept.names = kept.names.other();

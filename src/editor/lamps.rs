@@ -4,6 +4,7 @@
 
 use egui::{Align2, Color32, CornerRadius, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
+use crate::editor::pitch_needle::NO_SOUND;
 use crate::editor::snapshot::{NO_BREATH_KPA, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
@@ -96,7 +97,7 @@ fn meter(ui: &mut Ui, peak: f32, width: f32, has_word: bool) {
     if held.db > FLOOR_DB {
         painter.vline(x(held.db), track.y_range(), Stroke::new(2.0, c.ink));
     }
-    let said = if db <= FLOOR_DB { "Output silent".to_owned() } else { format!("Output {db:.0} dB") };
+    let said = if db <= FLOOR_DB { format!("Output: {NO_SOUND}") } else { format!("Output {db:.0} dB") };
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
     response
         .on_hover_text(format!("{said}. The output of both channels, {FLOOR_DB:.0} to 0 dB of full scale"));

@@ -6,6 +6,8 @@ use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
+/// What stands where a pitch would, when nothing sounds.
+pub const NO_SOUND: &str = "no sound";
 /// The scale reaches so far each way, cents.
 const SCALE_CENTS: f32 = 50.0;
 /// Within this distance a listener hears the note as in tune, cents.
@@ -40,7 +42,7 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
             painter.circle_filled(pos2(x, line_y - 14.0), 3.0, colour);
             if cents.abs() < 0.5 { "in tune".into() } else { format!("{cents:+.0} cents") }
         }
-        None => "no pitch".into(),
+        None => NO_SOUND.into(),
     };
     let place = pos2(rect.right(), rect.top() - 1.0);
     painter.text(place, Align2::RIGHT_TOP, &text, theme::small(), c.quiet);

@@ -432,6 +432,24 @@ fn every_control_is_reached_by_the_tab_key() {
     }
 }
 
+#[test]
+fn before_the_first_note_no_note_is_named() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    *window.snapshot.borrow_mut() = chalumeau::editor::Snapshot::default();
+    let kept = window.harness.state().kept.clone();
+    *window.harness.state_mut() = chalumeau::editor::EditorState::new(kept);
+    window.harness.ctx.data_mut(|data| data.clear());
+    window.harness.run();
+    window.harness.get_by_label("Written, no note yet");
+    assert!(window.harness.query_by_label_contains("sounds").is_none());
+    *window.snapshot.borrow_mut() = crate::c4();
+    window.harness.run();
+    window.snapshot.borrow_mut().sounding = None;
+    window.snapshot.borrow_mut().heard.f0_hz = None;
+    window.harness.run();
+    window.harness.get_by_label("Written C4, sounds Bb3, no sound");
+}
+
 /// As the eye goes: along the line of tools, from the left to the right.
 #[test]
 fn the_tab_key_goes_through_the_tools_from_left_to_right() {
