@@ -117,7 +117,7 @@ impl PlayView {
             } else if snapshot.sounding.is_none() {
                 let at = rect.center_bottom() - vec2(0.0, 10.0);
                 let text = "Play a key below, or blow. Click a hole to try it, drag it to move it.";
-                ui.painter().text(at, egui::Align2::CENTER_BOTTOM, text, theme::body(), c.quiet);
+                ui.painter().text(at, egui::Align2::CENTER_BOTTOM, text, theme::body(), c.ink);
             }
         });
     }
