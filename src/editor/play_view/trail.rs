@@ -3,7 +3,7 @@
 use egui::{Align2, Color32, CornerRadius, Mesh, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use crate::editor::chart;
-use crate::editor::snapshot::Snapshot;
+use crate::editor::snapshot::{Snapshot, Track};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -12,6 +12,30 @@ const LEVELS_DB: (f32, f32) = (-60.0, -6.0);
 /// The pitch axis is at least this wide, semitones.
 const LEAST_SEMITONES: f32 = 5.0;
 
+/// So far below the loudest of the last moments a note decays, and its pitch is nobody's, dB.
+const DECAY_DB: f32 = 25.0;
+/// The last moments, s: shorter than a player goes down by as much.
+const LOUDEST_OF_S: f32 = 1.0;
+/// Time in which a note finds its pitch, s.
+const ATTACK_S: f32 = 0.08;
+
+/// The pitches that were played: those of attacks and decays are left out. An attack follows a pause.
+fn played(track: &Track) -> Vec<Option<f32>> {
+    let count = track.level_db.len().min(track.pitch.len());
+    let steps = |seconds: f32| (seconds / track.step_s.max(1e-3)).round() as usize;
+    let (attack, recent) = (steps(ATTACK_S), steps(LOUDEST_OF_S));
+    let pitch = |index: usize| {
+        let before = &track.level_db[index.saturating_sub(recent)..=index];
+        let loudest = before.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let sounds = track.level_db[index] > loudest - DECAY_DB;
+        track.pitch[index].filter(|pitch| sounds && pitch.is_finite())
+    };
+    let sounding: Vec<_> = (0..count).map(pitch).collect();
+    let is_past_attack =
+        |index: usize| sounding[index.saturating_sub(attack)..index].iter().all(Option::is_some);
+    (0..count).map(|index| sounding[index].filter(|_| is_past_attack(index))).collect()
+}
+
 /// Draws the trail into all of the place.
 pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
@@ -19,12 +43,13 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, CornerRadius::same(theme::PANEL_RADIUS), c.panel);
     let track = &snapshot.history;
-    let count = track.level_db.len().min(track.pitch.len());
+    let pitches = played(track);
+    let count = pitches.len();
     let text = "last 10 s: pitch and loudness";
     let title =
         painter.text(rect.left_top() + vec2(10.0, 5.0), Align2::LEFT_TOP, text, theme::small(), c.quiet);
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, text));
-    let heard = || track.pitch.iter().copied().flatten().filter(|pitch| pitch.is_finite());
+    let heard = || pitches.iter().copied().flatten();
     if count < 2 || heard().next().is_none() {
         return;
     }
@@ -43,8 +68,8 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
     let share = |index: usize| chart::share((track.level_db[index] - quiet) / (loud - quiet));
     let mut mesh = Mesh::default();
     let mut line = Vec::new();
-    for index in 0..count {
-        let Some(pitch) = track.pitch[index].filter(|pitch| pitch.is_finite()) else {
+    for (index, pitch) in pitches.into_iter().enumerate() {
+        let Some(pitch) = pitch else {
             stroke(&painter, c.breath, std::mem::take(&mut line));
             continue;
         };
@@ -70,5 +95,34 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
 fn stroke(painter: &egui::Painter, colour: Color32, points: Vec<egui::Pos2>) {
     if points.len() > 1 {
         painter.add(egui::Shape::line(points, Stroke::new(2.0, colour)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pitch_of_an_attack_or_a_decay_is_left_out_and_a_slur_is_not() {
+        // Silence, a scoop into a note, a slur, and a decay in which the pitch is lost.
+        let note = |level: f32, pitch: Option<f32>, steps: usize| vec![(level, pitch); steps];
+        let values = [
+            note(-90.0, None, 10),
+            note(-20.0, Some(57.0), 4),
+            note(-20.0, Some(60.0), 50),
+            note(-20.0, Some(64.0), 50),
+            note(-40.0, Some(64.0), 5),
+            note(-50.0, Some(71.0), 5),
+            note(-90.0, None, 10),
+        ]
+        .concat();
+        let track = Track {
+            step_s: 0.02,
+            kpa: Vec::new(),
+            level_db: values.iter().map(|value| value.0).collect(),
+            pitch: values.iter().map(|value| value.1).collect(),
+        };
+        let shown = [vec![None; 14], vec![Some(60.0); 50], vec![Some(64.0); 55], vec![None; 15]].concat();
+        assert_eq!(played(&track), shown);
     }
 }
