@@ -1,7 +1,8 @@
 //! Which instrument the parameters ask for, and its file.
 
+use std::io;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
@@ -136,8 +137,7 @@ impl InstrumentRequest {
             Ok(is) if !is.is_file() => return Err(format!("{shown} is not a file")),
             _ => {}
         }
-        let text = crate::text_file::read(path)
-            .map_err(|reason| format!("cannot read {shown}: {reason}; put an instrument file there"))?;
+        let text = crate::text_file::read(path).map_err(|reason| unread(path, &reason))?;
         InstrumentFile::parse(&text).map_err(|reason| format!("{shown}: {reason}"))
     }
 
@@ -189,6 +189,19 @@ impl InstrumentRequest {
     }
 }
 
+/// Why the user's file was not read. Who has named none and has none is told how to come by one.
+fn unread(path: &Path, reason: &io::Error) -> String {
+    if reason.kind() == io::ErrorKind::NotFound && own_file().is_some_and(|own| own == path) {
+        return "No file of yours yet: open one, or move a hole and save".to_owned();
+    }
+    format!("cannot read {}: {reason}; put an instrument file there", path.display())
+}
+
+/// Where a user who names no file keeps one.
+fn own_file() -> Option<PathBuf> {
+    crate::data_folder::folder().map(|folder| folder.join("instruments/user.toml"))
+}
+
 /// The path of the user's instrument file: `named` if it is not empty, else the path in [`VARIABLE`], else
 /// `chalumeau/instruments/user.toml` in the user's data folder.
 pub fn user_file(named: &str) -> Option<PathBuf> {
@@ -196,7 +209,7 @@ pub fn user_file(named: &str) -> Option<PathBuf> {
         return Some(PathBuf::from(named));
     }
     let chosen = std::env::var_os(VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
-    chosen.or_else(|| crate::data_folder::folder().map(|folder| folder.join("instruments/user.toml")))
+    chosen.or_else(own_file)
 }
 
 #[cfg(test)]
@@ -226,6 +239,16 @@ mod tests {
         };
         let (model, readiness) = request.available_now(None).unwrap();
         assert_eq!((readiness, model.a4_hz), (Readiness::OtherA4, 440.0));
+    }
+
+    #[test]
+    fn who_has_no_file_is_told_how_to_come_by_one() {
+        let missing = io::Error::from(io::ErrorKind::NotFound);
+        let own = own_file().unwrap();
+        assert_eq!(unread(&own, &missing), "No file of yours yet: open one, or move a hole and save");
+        let forbidden = io::Error::from(io::ErrorKind::PermissionDenied);
+        assert!(unread(&own, &forbidden).contains("cannot read"), "other reasons are told as they are");
+        assert!(unread(Path::new("/mine.toml"), &missing).contains("cannot read /mine.toml"));
     }
 
     #[test]
