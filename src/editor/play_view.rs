@@ -114,6 +114,11 @@ impl PlayView {
                 if back.on_hover_text("Ends the trial; the played note sets the holes again").clicked() {
                     trial.end(actions);
                 }
+                if snapshot.sounding.is_none() {
+                    let at = place.right_center() + vec2(12.0, 0.0);
+                    let text = "Fingering held: play a key to hear it";
+                    ui.painter().text(at, egui::Align2::LEFT_CENTER, text, theme::body(), c.ink);
+                }
             } else if snapshot.sounding.is_none() {
                 let at = rect.center_bottom() - vec2(0.0, 10.0);
                 let text = "Play a key below, or blow. Click a hole to try it, drag it to move it.";
