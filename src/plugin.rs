@@ -225,7 +225,10 @@ impl Chalumeau {
         self.settings = self.params.settings();
         if let Some(instrument) = &mut self.instrument {
             instrument.set_settings(&self.settings);
-            context.set_latency_samples(instrument.clarinet().latency_samples());
+            // Nobody asks the standalone program for its latency, and the framework would print that it cannot tell.
+            if context.plugin_api() != PluginApi::Standalone {
+                context.set_latency_samples(instrument.clarinet().latency_samples());
+            }
             context.set_current_voice_capacity(self.settings.players.parts() as u32);
         }
         self.forget();
