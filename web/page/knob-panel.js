@@ -63,7 +63,7 @@ export class KnobPanel {
       await this.knob.connect();
     } catch (error) {
       // Who closes the browser's list has chosen none.
-      if (error.name !== 'NotFoundError') this.say(`No knob: ${error.message}`);
+      this.say(error.name === 'NotFoundError' ? 'No knob chosen.' : `No knob: ${error.message}`);
     }
   }
 

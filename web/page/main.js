@@ -31,7 +31,7 @@ const KNOB = 'the knob';
 /** Controllers of MIDI that blow. */
 const BLOWING = ['CC2', 'CC11', 'channel pressure'];
 const LOADING = 'Loading …';
-const IDLE = 'Press a key, or drag across the clarinet. To blow, let the page hear your microphone.';
+const IDLE = 'Press a key, or drag across the clarinet. To blow, press Blow.';
 const CHOOSE = 'Choose a note: press a key, or drag across the clarinet.';
 
 /** Least time between two notes that a screen reader is told, ms. */
@@ -59,6 +59,7 @@ const drag = new Drag(get('clarinet'), hands, breathe, (touches) => {
 const typing = new Typing(hands, breathe, (said) => {
   if (said.letters) keyboard.setLetters(said.letters);
   if (said.base) keyboard.show(said.base);
+  if (said.breath !== undefined) meter.mark(said.breath);
   if (said.start) {
     begin();
     takeBreath();

@@ -2,6 +2,10 @@
 
 /** Part of the column below the threshold. */
 const BELOW = 0.07;
+/** Dynamic of a key that is struck with 0 and with 1, and mouth pressure over the closing pressure where breath is pressure, as in the sound. */
+const [STRUCK, STRUCK_GAMMA] = [[0.15, 1], [0.43, 0.85]];
+/** Mouth pressure at the top, over the closing pressure. */
+const TOP_GAMMA = 1.2;
 /** Least mouth pressure that is shown, kPa. */
 const LEAST_KPA = 0.02;
 
@@ -9,7 +13,7 @@ export class Meter {
   /** `dynamics` are names and places between pianissimo, 0, and fortissimo, 1. */
   constructor(dynamics) {
     const get = (id) => document.getElementById(id);
-    [this.air, this.marks, this.words] = ['air', 'dynamics', 'breathing'].map(get);
+    [this.air, this.marks, this.words, this.set] = ['air', 'dynamics', 'breathing', 'set'].map(get);
     this.dynamics = dynamics;
     this.setPhysical(false);
   }
@@ -27,12 +31,21 @@ export class Meter {
     });
     this.marks.replaceChildren(...this.items);
     document.querySelector('.speaks').style.bottom = `${isPhysical ? 33 : 100 * BELOW}%`;
+    if (this.velocity !== undefined) this.mark(this.velocity);
+  }
+
+  /** Marks how loud the next key will be that is struck with this velocity, 0..1. */
+  mark(velocity) {
+    this.velocity = velocity;
+    const [soft, loud] = this.isPhysical ? STRUCK_GAMMA.map((gamma) => gamma / TOP_GAMMA) : STRUCK.map((dynamic) => BELOW + (0.95 - BELOW) * dynamic);
+    this.set.style.bottom = `${(100 * (soft + (loud - soft) * velocity)).toFixed(1)}%`;
+    this.set.hidden = false;
   }
 
   /** Dynamic 0..1, or below 0 where there is none; mouth pressure over the closing pressure, and in kPa. */
   follow(dynamic, gamma, kpa) {
     let height = 0;
-    if (kpa > LEAST_KPA) height = this.isPhysical || dynamic < 0 ? gamma / 1.2 : BELOW + (0.95 - BELOW) * dynamic;
+    if (kpa > LEAST_KPA) height = this.isPhysical || dynamic < 0 ? gamma / TOP_GAMMA : BELOW + (0.95 - BELOW) * dynamic;
     this.air.style.transform = `translateY(${(100 * (1 - Math.min(1, height))).toFixed(1)}%)`;
     const nearest = (item) => Math.abs(item.at - height);
     const now = height > 0 ? this.items.reduce((a, b) => (nearest(b) < nearest(a) ? b : a)) : null;

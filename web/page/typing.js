@@ -11,7 +11,7 @@ const [STEP, BEGIN] = [0.08, 0.66];
 const OPEN_LIST = CSS.supports('selector(:open)') ? 'select:open' : 'select';
 
 export class Typing {
-  /** `on` gets { letters }, { start } and { silence }; `breathe` the breath that the arrows set, or null. */
+  /** `on` gets { letters }, { start }, { silence } and { breath }, which the arrows have set for the keys to come; `breathe` the breath that the arrows set, or null. */
   constructor(hands, breathe, on) {
     Object.assign(this, { hands, breathe, on, held: new Map(), base: 60, breath: BEGIN });
     addEventListener('keydown', (event) => this.down(event));
@@ -61,6 +61,7 @@ export class Typing {
     } else if (!onControl && (event.code === 'ArrowUp' || event.code === 'ArrowDown')) {
       event.preventDefault();
       this.breath = clamp(this.breath + (event.code === 'ArrowUp' ? STEP : -STEP), 0.06, 1);
+      this.on({ breath: this.breath });
       if (this.held.size > 0) this.breathe(this.breath);
     }
   }
