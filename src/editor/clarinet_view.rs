@@ -139,8 +139,9 @@ impl ClarinetView {
             }
         }
         if self.alterations.is_open() {
-            // Left of it are words of the picture.
-            let place = Rect::from_min_max(area.min + vec2(190.0, 0.0), area.max);
+            // Between the words of the picture and its ruler.
+            let right = area.right() - 0.24 * area.width();
+            let place = Rect::from_min_max(area.min + vec2(190.0, 0.0), pos2(right, area.bottom()));
             AlterationEditor::saved(ui, place, snapshot, actions);
         }
     }

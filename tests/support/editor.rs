@@ -537,8 +537,6 @@ pub fn picture(kept: &WindowState, controls: &Fake, snapshot: &Snapshot, scale: 
     let mut snapshot = snapshot.clone();
     if !matches!(kept.tab, Tab::Reed | Tab::Knob) {
         blown_by_a_controller(&mut snapshot);
-    }
-    if matches!(kept.tab, Tab::Play | Tab::Breath) {
         snapshot.settings.breath_response = BreathResponse::Played;
         snapshot.dynamic = Some(MEZZO_FORTE as f32);
         let breath = breath_of_dynamic(MEZZO_FORTE, &snapshot.settings) as f32;
