@@ -256,9 +256,7 @@ fn a_change_of_preset_is_done_in_50_ms_and_does_not_click() {
             "{} to {}: {level:.2} {edge:.2} of a click, {arrived:.1} dB after 50 ms",
             from.name, to.name
         );
-        // Effects may swing in another way than before, and take longer to get there.
-        let most_db = if to.tags.iter().any(|tag| tag == "effects") { 4.0 } else { 3.0 };
-        if level > 1.0 || edge > 1.0 || arrived.abs() > most_db {
+        if level > 1.0 || edge > 1.0 || arrived.abs() > 3.0 {
             wrong.push(format!("{} to {}: {level:.2} {edge:.2} {arrived:.1} dB", from.name, to.name));
         }
     }

@@ -31,8 +31,8 @@ impl Doubt {
     /// For the user.
     pub fn text(self) -> &'static str {
         match self {
-            Self::Clipped => "samples clipped; lower --gain-db or use --bits 32f",
-            Self::Limited => "the limiter turned peaks down; lower --gain-db for levels as played",
+            Self::Clipped => "samples clipped; lower gain-db, or set bits to 32f",
+            Self::Limited => "the limiter turned peaks down; lower gain-db for levels as played",
             Self::Reset => "the calculation broke down and the instrument was reset; please report this",
         }
     }

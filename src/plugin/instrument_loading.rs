@@ -74,7 +74,7 @@ pub struct SharedInstrument {
     answered: AtomicU64,
     /// The latest request was refused, and the instrument before it plays on.
     is_refused: AtomicBool,
-    /// The loader's thread is to end, or never began.
+    /// The loader's thread is to end, has ended or never began.
     stop: AtomicBool,
 }
 

@@ -64,8 +64,7 @@ impl InstrumentLoader {
         };
         let thread =
             std::thread::Builder::new().name("InstrumentLoader".to_owned()).spawn(move || thread.run());
-        // Without a thread the plugin still gets an instrument at each activation, and must not wait for more.
-        shared.stop.store(thread.is_err(), Ordering::Relaxed);
+        // Without a thread the plugin still gets an instrument at each activation.
         let ends = Some((incoming, outgoing));
         Self { params, shared, thread: thread.ok(), cache, tuning_program, activations: 0, ends }
     }
@@ -215,6 +214,13 @@ enum Interrupted {
     Obsolete,
     /// The request failed; a message for the user.
     Failed(String),
+}
+
+/// However the thread ends, and if it never began, the audio thread must not wait for it.
+impl Drop for LoaderThread {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+    }
 }
 
 impl LoaderThread {

@@ -342,7 +342,9 @@ impl Player {
 
     /// The tongue holds the reed before a note.
     fn prepare(&mut self) {
-        self.tongue.hold();
+        let is_in_time =
+            self.settings.breath_response == BreathResponse::Played && retongued::rings(self.ear.amplitude());
+        self.tongue.hold(is_in_time);
         self.inflection.begin(&self.settings.articulation);
     }
 
@@ -599,8 +601,7 @@ impl Player {
         let shaken = self.techniques.shake(gamma, note_hz * self.tuning.speed(), settings, tick_s);
         let hardness =
             self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
-        let listens = settings.breath_response == BreathResponse::Played;
-        let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, listens.then_some(&self.ear), &context);
+        let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, &self.ear, &context);
         let beside_cents = self.slide.as_ref().map_or(0.0, Slide::beside_cents);
         let added_cents = (sway.cents, self.inflection.cents() + beside_cents);
         let has_other_speed = self.tuning.tick(fingering, gamma, added_cents, &context, model, lattice);

@@ -1,7 +1,7 @@
 //! The tongue: it holds the reed before a note, lets go, stops the note, and slaps.
 
 use super::ear::Ear;
-use super::retongued::{self, IN_TIME_S, LONGEST_WAIT_S};
+use super::retongued::{IN_TIME_S, LONGEST_WAIT_S};
 use super::{TickContext, step_towards};
 use crate::instrument::slap::{BREATH_GAMMA, Slap};
 use crate::reed::motion::TONGUE_FORCE;
@@ -44,6 +44,8 @@ pub struct Tongue {
     position: Position,
     /// Time for which it has been away, s, up to [`SHORTEST_S`].
     away_s: f64,
+    /// The note before still rings, and it lets go in time with that.
+    is_in_time: bool,
     /// The key has come up: it lands as soon as it may.
     is_due: bool,
     /// The slap that pulls at the reed, if there is one; it overrides the position.
@@ -57,6 +59,7 @@ impl Default for Tongue {
         Self {
             position: Position::Resting,
             away_s: SHORTEST_S,
+            is_in_time: false,
             is_due: false,
             slap: None,
             force: TONGUE_FORCE,
@@ -65,8 +68,9 @@ impl Default for Tongue {
 }
 
 impl Tongue {
-    /// Prepares a tongued note.
-    pub fn hold(&mut self) {
+    /// Prepares a tongued note, which begins in time with what rings if the note before does.
+    pub fn hold(&mut self, is_in_time: bool) {
+        self.is_in_time = is_in_time;
         self.position = Position::Holding(HOLD_S);
         (self.away_s, self.is_due) = (0.0, false);
     }
@@ -134,15 +138,9 @@ impl Tongue {
     }
 
     /// Moves the tongue. `gamma` is the mouth pressure over the closing pressure, `hardness` the factor of
-    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness), and `ear` what the player hears who lets go in time with it, if he does. Gives the pressure at the reed's tip and
+    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness), and `ear` hears what rings. Gives the pressure at the reed's tip and
     /// the force on the reed, both over the reference closing pressure.
-    pub fn tick(
-        &mut self,
-        gamma: f64,
-        hardness: f64,
-        ear: Option<&Ear>,
-        context: &TickContext<'_>,
-    ) -> (f64, f64) {
+    pub fn tick(&mut self, gamma: f64, hardness: f64, ear: &Ear, context: &TickContext<'_>) -> (f64, f64) {
         let (tick_s, closing) = (context.tick_s, context.posture.closing);
         let free_closing = context.posture.free_closing;
         let share = self.move_on(gamma, hardness, ear, context);
@@ -172,7 +170,7 @@ impl Tongue {
     }
 
     /// Moves on to the next position; gives the share of the full force that the position asks for.
-    fn move_on(&mut self, gamma: f64, hardness: f64, ear: Option<&Ear>, context: &TickContext<'_>) -> f64 {
+    fn move_on(&mut self, gamma: f64, hardness: f64, ear: &Ear, context: &TickContext<'_>) -> f64 {
         let tick_s = context.tick_s;
         let (position, share) = match self.position {
             Position::Resting => (Position::Resting, 1.0),
@@ -183,12 +181,8 @@ impl Tongue {
                 (if lands { Position::Stopping(0.0) } else { Position::Away }, 0.0)
             }
             Position::Holding(left_s) if left_s > tick_s => (Position::Holding(left_s - tick_s), 1.0),
-            Position::Holding(_) if ear.is_some_and(retongued::rings) => {
-                (Position::Listening(LONGEST_WAIT_S), 1.0)
-            }
-            Position::Listening(_) if ear.is_some_and(Ear::rises_through_zero) => {
-                (Position::InTime(IN_TIME_S), 1.0)
-            }
+            Position::Holding(_) if self.is_in_time => (Position::Listening(LONGEST_WAIT_S), 1.0),
+            Position::Listening(_) if ear.rises_through_zero() => (Position::InTime(IN_TIME_S), 1.0),
             Position::Listening(left_s) if left_s > tick_s => (Position::Listening(left_s - tick_s), 1.0),
             Position::InTime(left_s) if left_s > tick_s => (Position::InTime(left_s - tick_s), 1.0),
             Position::Holding(_) | Position::Listening(_) | Position::InTime(_) => {
