@@ -53,9 +53,17 @@ def render(
     note or ``scale="E3:C6"`` for a scale.
 
     Every flag of ``chalumeau render`` that does not name an output is an argument here, with underscores for hyphens:
-    ``seconds`` (0.01..3600, 2 for one note), ``tail`` (s), ``gamma`` (0..3, mouth pressure over closing pressure; 0.5 where neither a
-    score nor another argument sets the breath), ``breath`` (the same quantity over time: one number, "ramp:0:1:4" or a CSV file),
-    ``crescendo`` ("0.4:0.9"), ``no_noise=True``, ``slurred=True``, ``preset``, ``quality="high"``, ``scl``, ``unison=True`` ...
+    ``no_noise=True``, ``slurred=True``, ``preset``, ``quality="high"``, ``scl``, ``unison=True`` ...; and
+
+    - ``seconds``: length of the note, 0.01..3600 s, without it 2; of each note of a scale, without it 0.5; ``tail``: time to fade
+      after the end, 0..60 s;
+    - ``gamma``: constant mouth pressure over the closing pressure, 0..3. Without any breath it is 0.5, or the breath of the score;
+    - ``breath``: the same over time, ``"ramp:0:1:4"`` (from, to, seconds), or the path of a CSV file ``t_s,gamma``. A number is the
+      same as ``gamma``, except that with most presets ``breath`` and ``crescendo`` are shares of full breath, 0..1. With
+      ``breath_response="Played"`` all of them are;
+    - ``crescendo``: from one gamma to another over the whole length, ``"0.4:0.9"``;
+    - ``dynamic``: how loud, as a player plays, ``"mf"`` or ``"pp:ff"``.
+
     So is every setting by its id, name or flag (see `parameters`). ``settings`` takes them as a dict, also by names with
     spaces.
 

@@ -5,8 +5,8 @@ use crate::cli::shared_args::{dynamics, within};
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// Gamma where nothing else is said: a full, easy tone.
 pub const GAMMA_DEFAULT: f32 = 0.5;
@@ -93,7 +93,7 @@ impl BreathArgs {
             return Err(Failure::Usage(format!("--breath {text}: for a dynamic give --dynamic {text}")));
         }
         let path = PathBuf::from(text);
-        let from = fs::File::open(&path).map_err(|source| Failure::Read { path: path.clone(), source })?;
+        let from = fs::File::open(&path).map_err(|source| no_such_breath(path.clone(), source))?;
         match BreathCurve::read_csv(from) {
             Ok(curve) => Ok(Some(curve)),
             Err(source) => Err(Failure::BreathFile { path, source }),
@@ -110,6 +110,18 @@ impl BreathArgs {
         let is_file = |text: &&str| text.parse::<f32>().is_err() && !text.starts_with("ramp:");
         [self.breath.as_deref().filter(is_file).map(Path::new), self.replay.as_deref()]
     }
+}
+
+/// Why a file cannot be read; what has not the name of a file may be meant as something else.
+fn no_such_breath(path: PathBuf, source: io::Error) -> Failure {
+    if source.kind() == io::ErrorKind::NotFound && path.extension().is_none() {
+        return Failure::Usage(format!(
+            "--breath {}: there is no such file; give a number, which is gamma, 0..{GAMMA_MAX}, or ramp:FROM:TO:SECONDS, or a CSV file \
+             t_s,gamma",
+            path.display()
+        ));
+    }
+    Failure::Read { path, source }
 }
 
 /// Reads a recorded take.
