@@ -55,7 +55,10 @@ impl Instrument {
         let table: toml::Table = serde_json::from_str(text)
             .map_err(|error| wrong(format_args!("the dict is not like an instrument file: {error}")))?;
         let text = toml::to_string(&table).map_err(wrong)?;
-        Self::parse(&text)
+        let file = InstrumentFile::parse(&text).map_err(|error| {
+            wrong(format_args!("the dict is no instrument: {}", of_dict(&error.to_string())))
+        })?;
+        Ok(Self { file, origin: Origin::Text(text) })
     }
 
     /// What a player calls it.
@@ -125,6 +128,26 @@ impl Instrument {
             Origin::Text(text) => ("parse", text.as_str()),
         };
         Ok((PyType::new::<Self>(py).getattr(maker)?, (of.to_owned(),)))
+    }
+}
+
+/// An error about the text that was made of a dict, without its lines, which the user does not see.
+fn of_dict(error: &str) -> String {
+    let no_line = |text: &str| text.strip_prefix("line ")?.split_once(": ").map(|(_, what)| what.to_owned());
+    if !error.contains("TOML parse error at line") {
+        return no_line(error).unwrap_or_else(|| error.to_owned());
+    }
+    let says = error.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    // Of a key that is missing, the first line of its table is shown.
+    let is_quoted =
+        |line: &&str| line.split_once('|').is_some_and(|(number, _)| number.trim().parse::<u32>().is_ok());
+    let quoted =
+        error.lines().find(is_quoted).and_then(|line| line.split_once('|')).map(|(_, text)| text.trim());
+    match quoted {
+        Some(text) if text.starts_with('[') || !says.starts_with("missing field") => {
+            format!("{text}: {says}")
+        }
+        _ => says.to_owned(),
     }
 }
 

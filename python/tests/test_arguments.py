@@ -91,6 +91,27 @@ def test_settings_that_cannot_change_are_refused():
         (lambda: chalumeau.rows([{"written": "C4", "qqq": 1}]), ValueError, "qqq"),
         (lambda: chalumeau.rows({"vary": {"gamma": [0.4, float("nan")]}}), ValueError, "['gamma'][1]"),
         (lambda: chalumeau.dataset([{"written": "C4"}], "never", workers=0), ValueError, "at least 1"),
+        (lambda: chalumeau.dataset([{"written": "C4"}], "never", workers=2.5), ValueError, "workers must be a whole number, got 2.5"),
+        (lambda: chalumeau.dataset([{"written": "C4"}], "never", workers=float("nan")), ValueError, "workers must be a whole number"),
+        (lambda: chalumeau.dataset([{"written": "C4"}], "never", workers="2"), TypeError, "workers must be a number"),
+        (lambda: chalumeau.render(written="C4", breath="50 %"), ValueError, "ramp:FROM:TO:SECONDS"),
+        (lambda: chalumeau.bifurcation("F3", gamma=0.5), ValueError, "gamma is an argument of chalumeau.render"),
+        (lambda: chalumeau.bifurcation("F3", preset="Growl"), ValueError, "preset is an argument of chalumeau.render"),
+        (lambda: chalumeau.Clarinet(channels=2), ValueError, "channels is an argument of chalumeau.render"),
+        (lambda: chalumeau.thresholds(gamma=1), ValueError, '"gamma"; there are zeta, strength, lip, H, k, temperature'),
+        (lambda: chalumeau.feel("C5", foo=1), ValueError, "contrast"),
+        (lambda: chalumeau.feel("C5", contrst=2), ValueError, "do you mean contrast?"),
+        (lambda: chalumeau.impedance("E3", [100 + 50j]), ValueError, "frequencies_hz must be real numbers"),
+        (lambda: chalumeau.torque("C5", [1j]), ValueError, "angles_deg must be real numbers"),
+        (lambda: chalumeau.reed_flow([1j]), ValueError, "p must be real numbers"),
+        (lambda: chalumeau.reed_flow(["loud"]), ValueError, "p must be numbers"),
+        (lambda: chalumeau.impedance("E3", [200.0], reed_volume="no"), TypeError, "reed_volume must be True or False, got 'no'"),
+        (lambda: chalumeau.rows([1]), TypeError, "a row is a dict"),
+        (lambda: chalumeau.rows(5), TypeError, "not 5"),
+        (lambda: chalumeau.measure(None), TypeError, "a row is a dict"),
+        (lambda: chalumeau.Clarinet().render_into(np.zeros(10)), TypeError, "float32"),
+        (lambda: chalumeau.Clarinet().render_into(np.zeros((2, 10), np.float32)), TypeError, "2 dimensions"),
+        (lambda: chalumeau.instrument({"name": "x", "bore": [], "length": 3}), ValueError, "the dict is no instrument: length = 3: unknown"),
     ],
 )
 def test_mistakes_are_told_in_words_of_python(make, kind, says):
@@ -103,6 +124,33 @@ def test_plans_take_arrays_and_ranges():
     given = {"same": {"seconds": np.float64(0.5)}, "vary": {"written": range(60, 62), "gamma": np.array([0.4, 0.5])}}
     plain = {"same": {"seconds": 0.5}, "vary": {"written": [60, 61], "gamma": [0.4, 0.5]}}
     assert chalumeau.rows(given) == chalumeau.rows(plain)
+
+
+class Missing:
+    """As pandas marks a value that is missing."""
+
+    def __bool__(self):
+        raise TypeError("boolean value of NA is ambiguous")
+
+    def __repr__(self):
+        return "<NA>"
+
+
+class Column(list):
+    """A column of a table, as pandas has it."""
+
+    def __array__(self, dtype=None, copy=None):
+        return np.array(list(self), dtype)
+
+
+def test_columns_and_missing_values_of_tables():
+    Missing.__name__ = "NAType"
+    with pytest.raises(ValueError, match="gamma is missing"):
+        chalumeau.measure({"written": "C4", "gamma": Missing()})
+    with pytest.raises(ValueError, match="gamma is missing"):
+        chalumeau.rows([{"written": "C4", "gamma": Missing()}])
+    given = {"vary": {"written": ["C4", "D4"], "gamma": Column([0.4, 0.5])}}
+    assert len(chalumeau.rows(given)) == 4
 
 
 def test_equal_instruments_have_equal_hashes():

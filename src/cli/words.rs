@@ -76,6 +76,7 @@ impl Names {
         let flags = self.command.get_arguments().filter_map(Arg::get_long);
         let ids = PARAMETERS.iter().map(|parameter| parameter.id).filter(|_| self.sets);
         let known: Vec<_> = flags.chain(ids).collect();
+        let all = known.join(", ");
         let begin: Vec<_> = known.iter().copied().filter(|known| known.starts_with(name)).collect();
         let near = if name.is_empty() || begin.is_empty() {
             let distance = |known: &&str| strsim::osa_distance(known, name);
@@ -91,7 +92,7 @@ impl Names {
             None if self.sets => format!(
                 "{what} is called {name:?}; `chalumeau render --help` and `chalumeau parameters` list them"
             ),
-            None => format!("{what} is called {name:?}"),
+            None => format!("{what} is called {name:?}; there are {all}"),
         })
     }
 

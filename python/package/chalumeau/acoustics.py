@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chalumeau import _native
-from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, note, number, pairs, whole
+from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, is_only_of_render, note, number, pairs, switch, whole
 
 #: A written note, or the names of the open holes.
 FingeringLike = Union[NoteLike, Sequence[str]]
@@ -22,11 +22,16 @@ def _fingering(fingering: FingeringLike) -> int | list[str]:
     return note(cast(NoteLike, fingering))
 
 
-def _numbers(values: npt.ArrayLike) -> tuple[_Floats, tuple[int, ...]]:
+def _numbers(name: str, values: npt.ArrayLike) -> tuple[_Floats, tuple[int, ...]]:
     given = values if isinstance(values, np.ndarray) else np.asarray(values)
     if np.ma.is_masked(given) or given.dtype == object and any(value is None for value in given.flat):
-        raise ValueError("None and masked values are no numbers; leave them out, or give nan")
-    return np.ascontiguousarray(given, np.float64).reshape(-1), given.shape
+        raise ValueError(f"{name}: None and masked values are no numbers; leave them out, or give nan")
+    if given.dtype.kind == "c":
+        raise ValueError(f"{name} must be real numbers, got complex ones; take their real part")
+    try:
+        return np.ascontiguousarray(given, np.float64).reshape(-1), given.shape
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{name} must be numbers: {error}") from None
 
 
 def impedance(
@@ -57,9 +62,14 @@ def impedance(
     """
     if model not in ("tmm", "lattice"):
         raise ValueError(f"model must be 'tmm' or 'lattice', got {model!r}")
-    flat, shape = _numbers(frequencies_hz)
+    flat, shape = _numbers("frequencies_hz", frequencies_hz)
     z = _native.impedance(
-        instrument_of(instrument), _fingering(fingering), flat, model == "lattice", reed_volume, number("temperature", temperature)
+        instrument_of(instrument),
+        _fingering(fingering),
+        flat,
+        model == "lattice",
+        switch("reed_volume", reed_volume),
+        number("temperature", temperature),
     )
     return z.reshape(shape)
 
@@ -85,7 +95,7 @@ def impedance_peaks(
     if count < 1:
         raise ValueError(f"count must lie in 1..30, got {count}")
     return _native.impedance_peaks(
-        instrument_of(instrument), _fingering(fingering), count, reed_volume, number("temperature", temperature)
+        instrument_of(instrument), _fingering(fingering), count, switch("reed_volume", reed_volume), number("temperature", temperature)
     )
 
 
@@ -126,7 +136,7 @@ def bifurcation(
 ) -> dict[str, Any]:
     """Plays a written note with breath that rises slowly from 0 to gamma ``to`` (0.2..3) in ``seconds`` (0.5..600), and falls.
 
-    ``settings`` are as in `render`. Returns arrays of equal length: ``direction`` (1 rising, -1 falling), ``gamma``, ``rms``
+    ``settings`` are those of the sound, as in `render` (see `parameters`). Returns arrays of equal length: ``direction`` (1 rising, -1 falling), ``gamma``, ``rms``
     (pressure in the mouthpiece over the closing pressure) and ``shut`` (share of time in which the reed is shut); and the
     gammas at which the note ``begins``, ``beats``, ``chokes``, ``returns``, ``opens`` and ``ends``, None where it does not.
 
@@ -138,6 +148,12 @@ def bifurcation(
     >>> bool(1 / 3 < ramp["begins"] < 0.6), ramp["chokes"]
     (True, None)
     """
+    for name, value in settings.items():
+        if value is not None and is_only_of_render(name):
+            raise ValueError(
+                f"{name} is an argument of chalumeau.render, which plays a score with a breath of its choice; "
+                "bifurcation blows one note from 0 to gamma `to` and back, and takes settings of the sound (chalumeau.parameters())"
+            )
     return _native.bifurcation(
         pairs(settings, {"rate": rate}), instrument_of(instrument), note(written), number("to", to), number("seconds", seconds)
     )
@@ -174,7 +190,7 @@ def reed_flow(
     >>> [round(float(u), 3) for u in chalumeau.reed_flow([0, 1 / 3, 1, 1.2])]
     [0.0, 1.0, 0.0, 0.0]
     """
-    flat, shape = _numbers(p)
+    flat, shape = _numbers("p", p)
     opening, stiffness = (None if value is None else number(name, value) for name, value in (("H", H), ("k", k)))
     return _native.reed_flow(flat, opening, stiffness, number("A", A)).reshape(shape)
 
@@ -212,7 +228,7 @@ def torque(
     >>> bool(torques[1] > torques[2] > torques[3])
     True
     """
-    flat, shape = _numbers(angles_deg)
+    flat, shape = _numbers("angles_deg", angles_deg)
     return _native.torque(pairs(design), instrument_of(instrument), note(written), flat).reshape(shape)
 
 
@@ -237,7 +253,7 @@ def features(samples: npt.ArrayLike, rate: float = 48_000, *, near: float | None
         raise ValueError("samples are whole numbers, and full scale is 1.0; of 16 bits, divide them by 32768")
     if kind == "c":
         raise ValueError("samples are complex numbers, which have no level; take their real part")
-    array = _numbers(samples)[0].reshape(np.shape(samples)).astype(np.float32)
+    array = _numbers("samples", samples)[0].reshape(np.shape(samples)).astype(np.float32)
     if not np.isfinite(array).all():
         raise ValueError("samples hold NaN or infinity, which has no pitch or level; measure a part without them")
     if array.ndim != 1:

@@ -110,7 +110,10 @@ def presets() -> list[dict[str, Any]]:
 
 
 def plain(name: str, value: Any) -> Any:
-    """A number of numpy as Python has it. Refuses arrays of several values, and masked ones."""
+    """A number of numpy as Python has it. Refuses arrays of several values, and masked and missing ones."""
+    # Of pandas, which is not needed here.
+    if type(value).__name__ == "NAType":
+        raise ValueError(f"{name} is missing ({value}); give a value, or None to leave it out")
     if not isinstance(value, (np.ndarray, np.generic)):
         return value
     if value.shape != ():
@@ -136,6 +139,22 @@ def whole(name: str, value: Any) -> int:
     return int(found)
 
 
+def at_least_1(name: str, value: Any) -> int:
+    """An argument that is a number of things."""
+    found = whole(name, value)
+    if found < 1:
+        raise ValueError(f"{name} must be at least 1, got {value}")
+    return found
+
+
+def switch(name: str, value: Any) -> bool:
+    """An argument that is True or False; 1 and 0 are the same."""
+    value = plain(name, value)
+    if not isinstance(value, (bool, int, float)) or value not in (0, 1):
+        raise TypeError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
 def whole_of(name: str, value: Any) -> int:
     """The same, also written as a text: a field of a plan."""
     try:
@@ -148,7 +167,8 @@ def as_json(place: str, value: Any) -> Any:
     """Tables with lists and numbers as JSON has them; what is None is left out."""
     if isinstance(value, Mapping):
         return {name: as_json(f"{place}[{name!r}]", each) for name, each in value.items() if each is not None}
-    if isinstance(value, np.ndarray) and value.shape != ():
+    if hasattr(value, "__array__") and np.ndim(value) > 0:
+        # Arrays, and the columns of a table of pandas.
         value = list(value)
     if isinstance(value, (list, tuple, range)):
         return [as_json(f"{place}[{at}]", each) for at, each in enumerate(value)]
@@ -223,6 +243,18 @@ def is_of_render(name: str) -> bool:
     except ValueError as error:
         return " is called " not in str(error)
     return True
+
+
+#: Settings of a single clarinet that are no parameters.
+_OF_SOUND = ("no_noise", "tempered", "natural", "quality", "untuned")
+
+
+def is_only_of_render(name: str) -> bool:
+    """Whether a name is an argument of `render` and no setting of the sound."""
+    spelt = name.replace("-", "_")
+    if spelt in _OF_SOUND or spelt.startswith("reed_") or setting_id(name) in {each["id"] for each in parameters()}:
+        return False
+    return spelt in ("score", "channels") or is_of_render(name)
 
 
 @cache

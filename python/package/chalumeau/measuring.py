@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Union
 
 import numpy as np
@@ -40,8 +40,12 @@ def rows(plan: PlanLike) -> list[dict[str, str]]:
         names, values = _native.rows(text=plan)
     elif isinstance(plan, (str, os.PathLike)):
         names, values = _native.rows(path=os.fspath(plan))
+    elif hasattr(plan, "to_dict"):
+        raise TypeError(f"a plan is not a {type(plan).__name__}; of a table of pandas give its rows: frame.to_dict(\"records\")")
+    elif not isinstance(plan, Iterable):
+        raise TypeError(f"a plan is a path, a text, a dict of its tables or a list of rows, not {plan!r}")
     else:
-        given = [{name: text_of(name, value) for name, value in row.items()} for row in plan]
+        given = [{name: text_of(name, value) for name, value in _row(row).items()} for row in plan]
         names = list(dict.fromkeys(name for row in given for name in row))
         for name in names:
             if name not in ("channels", "bits", "out", "force") and not is_of_render(name):
@@ -50,13 +54,21 @@ def rows(plan: PlanLike) -> list[dict[str, str]]:
     return [dict(zip(names, of_row)) for of_row in values]
 
 
+def _row(row: Any) -> Mapping[str, Value]:
+    if not isinstance(row, Mapping):
+        raise TypeError(f"a row is a dict such as {{'written': 'C4', 'seconds': 1}}, not {row!r}")
+    return row
+
+
 #: Columns of plans of ``chalumeau batch`` that are of its files.
 _OF_FILES = ("bits", "out", "force")
 
 
 def split(row: Mapping[str, Value]) -> tuple[Any, dict[str, Any], int | None, int]:
     """What a row plays, its settings, its channels (None: as many as the command would write) and its rate."""
-    named: dict[str, Any] = {name: value for name, value in row.items() if value is not None and value != ""}
+    named: dict[str, Any] = {
+        name: value for name, value in _row(row).items() if value is not None and not (isinstance(value, str) and value == "")
+    }
     for own in _OF_FILES:
         if own in named:
             raise ValueError(f"{own} is of files of chalumeau batch; samples here are always 32-bit floats")

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chalumeau import _native
-from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, is_of_render, note, number, pairs, parameters, setting_id, whole
+from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, is_only_of_render, note, number, pairs, parameters, setting_id, whole
 
 #: 32-bit float samples, full scale 1.0.
 Samples = npt.NDArray[np.float32]
@@ -192,7 +192,7 @@ def _refuse_idle(settings: Mapping[str, Value] | None, named: Mapping[str, Value
             raise ValueError(f"{name} is chosen when a Clarinet is made: Clarinet({name}=...)")
         if setting_id(name) in idle or spelt == "unison":
             raise ValueError(f"{name} does nothing here: a Clarinet is one player, mono and without a room; use chalumeau.render")
-        if setting_id(name) not in known and spelt not in known and not spelt.startswith("reed_") and is_of_render(name):
+        if is_only_of_render(name):
             raise ValueError(
                 f"{name} is an argument of chalumeau.render, which plays a whole score; "
                 "a Clarinet takes settings of the sound (chalumeau.parameters()), and is played by breath, note_on ..."
@@ -225,7 +225,8 @@ class Clarinet:
     """A clarinet that is played event by event: what a host's audio thread does, at your pace.
 
     ``instrument`` and the settings of the sound are as in `render`; what only a whole rendering has (scores, presets, several
-    players, a room) is refused. Sound is made only by `render`, `render_into` and
+    players, a room) is refused. As there, the first one with ``a4`` outside 430..450 Hz, or with an instrument of your own, is prepared
+    for up to a minute. Sound is made only by `render`, `render_into` and
     `play`; events act between the samples. How the time is cut into pieces does not change a bit of the sound. Mono; for a
     room or several players use `chalumeau.render`.
 
@@ -353,7 +354,10 @@ class Clarinet:
         return self._voice.render(self._samples(seconds))
 
     def render_into(self, out: Samples) -> None:
-        """Overwrites a contiguous float32 array with the next samples; allocates nothing."""
+        """Overwrites a contiguous float32 array of one dimension with the next samples; allocates nothing."""
+        if not isinstance(out, np.ndarray) or out.dtype != np.float32 or out.ndim != 1:
+            got = f"{out.ndim} dimensions of {out.dtype}" if isinstance(out, np.ndarray) else repr(out)
+            raise TypeError(f"out must be an array of one dimension of float32, such as numpy.empty(480, numpy.float32), got {got}")
         self._voice.render_into(out)
 
     def play(self, events: Iterable[tuple[Any, ...]], seconds: float) -> Samples:
