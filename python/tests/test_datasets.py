@@ -73,6 +73,10 @@ def test_what_was_stopped_goes_on(tmp_path):
     with pytest.raises(ValueError, match="another plan"):
         chalumeau.dataset(PLAN.replace("0.5\nno", "0.4\nno"), tmp_path, rows_per_part=3)
     assert chalumeau.dataset(PLAN, tmp_path, rows_per_part=3).rendered == 0
+    # Files of another size would stand beside those that are there.
+    for other in (1, 25):
+        with pytest.raises(ValueError, match=f"begun with rows_per_part=3, got rows_per_part={other}"):
+            chalumeau.dataset(PLAN, tmp_path, rows_per_part=other)
     # Nor does one whose plan nobody knows.
     (tmp_path / datasets.PLAN).unlink()
     with pytest.raises(ValueError, match="another plan"):

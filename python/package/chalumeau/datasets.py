@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from chalumeau.arguments import at_least_1
 from chalumeau.measuring import PlanLike, check, measure, rows
 from chalumeau.parquet_parts import PARQUET, Done, Part, is_there, load_parquet, parts, render_part
 
@@ -88,8 +89,8 @@ def dataset(
         work = ray.remote(chalumeau.datasets.render_part)                        # Ray
         dataset(plan, into, map=lambda _, parts: ray.get([work.remote(part) for part in parts]))
 
-    Each file has some rows, ``rows_per_part``, and appears when it is whole. Whatever is stopped or dies, the same call goes
-    on where it was, and at the end every row is there once: that is checked. Rows whose files (instrument, MIDI, scale ...) or presets have
+    Each file has some rows, ``rows_per_part``, and appears when it is whole. Whatever is stopped or dies, the same call, with the same
+    ``rows_per_part``, goes on where it was, and at the end every row is there once: that is checked. Rows whose files (instrument, MIDI, scale ...) or presets have
     changed are rendered again. All rows that are left are checked before the first is rendered. A folder that holds the rows of another plan,
     or a manifest.csv that is of none, is refused.
 
@@ -108,18 +109,19 @@ def dataset(
     (4, 4, 0)
     """
     began = time.monotonic()
-    if workers < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
+    workers, rows_per_part = at_least_1("workers", workers), at_least_1("rows_per_part", rows_per_part)
     cut = parts(plan, into, sound=sound, rows_per_part=rows_per_part)
+    planned, stamp = _digest(cut), Path(into, PLAN)
+    # The plan is written before any file. Files without one are those of an older version, which kept none.
+    begun = stamp.read_text() if stamp.exists() else None
+    if begun == planned:
+        _refuse_another_cut(cut, into, rows_per_part)
     ours = {part.file for part in cut}
     foreign = sorted(path.name for path in Path(into).glob(f"{PARQUET}/*.parquet") if f"{PARQUET}/{path.name}" not in ours)
     if foreign:
         raise ValueError(f"{into} has files of another data set: {', '.join(foreign[:3])} ...; take another folder")
-    planned, stamp = _digest(cut), Path(into, PLAN)
     left = [part for part in cut if not is_there(part)]
     is_begun = any(Path(into, part.file).exists() for part in cut)
-    # The plan is written before any file. Files without one are those of an older version, which kept none.
-    begun = stamp.read_text() if stamp.exists() else None
     # Where nothing was made, as by a plan with a mistake, another plan may begin.
     if begun != planned and is_begun:
         raise ValueError(f"{into} holds a data set of another plan; take another folder, or remove this one first")
@@ -154,6 +156,24 @@ def dataset(
 def _digest(cut: Sequence[Part]) -> str:
     rows = [row for part in cut for row in part.rows]
     return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
+
+
+def _refuse_another_cut(cut: Sequence[Part], into: str | os.PathLike[str], rows_per_part: int) -> None:
+    """Refuses to go on with other ``rows_per_part`` than the folder was begun with: all would be rendered again, beside the old files."""
+    _, parquet = load_parquet()
+    ours, begun_with, is_another = {part.file: len(part.rows) for part in cut}, 0, False
+    for path in Path(into).glob(f"{PARQUET}/*.parquet"):
+        try:
+            rows_there = parquet.read_metadata(path).num_rows
+        except (OSError, ValueError):
+            continue
+        begun_with = max(begun_with, rows_there)
+        is_another |= ours.get(f"{PARQUET}/{path.name}") != rows_there
+    if is_another:
+        raise ValueError(
+            f"{into} was begun with rows_per_part={begun_with}, got rows_per_part={rows_per_part}; "
+            f"give rows_per_part={begun_with}, or take another folder"
+        )
 
 
 def _check(left: Sequence[Part]) -> None:

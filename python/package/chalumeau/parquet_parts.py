@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from chalumeau import _native
+from chalumeau.arguments import at_least_1
 from chalumeau.measuring import PlanLike, measure, rows
 
 #: The folder of the files, in that of the data set.
@@ -64,8 +65,7 @@ class Done:
 
 def parts(plan: PlanLike, into: str | os.PathLike[str], *, sound: bool = False, rows_per_part: int = 25) -> list[Part]:
     """A plan cut into parts, which workers may render in any order, and more than once."""
-    if rows_per_part < 1:
-        raise ValueError(f"rows_per_part must be at least 1, got {rows_per_part}")
+    rows_per_part = at_least_1("rows_per_part", rows_per_part)
     all_rows = rows(plan)
     if not all_rows:
         raise ValueError("the plan has no rows")
