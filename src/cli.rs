@@ -69,6 +69,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 /// Exit code that a shell expects of a program that was interrupted.
 const INTERRUPTED: i32 = 130;
@@ -302,8 +303,19 @@ fn failed(failure: &Failure) -> ExitCode {
     ExitCode::from(2)
 }
 
+/// Who hears what is said in place of the terminal.
+static LISTENER: OnceLock<fn(&str)> = OnceLock::new();
+
+/// Tells what the code of the commands says to `listener`, for a program that calls it. The first one stays.
+pub fn say_to(listener: fn(&str)) {
+    let _ = LISTENER.set(listener);
+}
+
 /// See `say!`.
 fn say_line(text: fmt::Arguments) {
+    if let Some(listener) = LISTENER.get() {
+        return listener(&text.to_string());
+    }
     // In one piece, beside other programs that write there.
     let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }

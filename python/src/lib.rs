@@ -60,6 +60,7 @@ fn presets(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
 /// The compiled part of the package `chalumeau`.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    chalumeau::cli::say_to(mistakes::warn);
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<instrument::Instrument>()?;
     module.add_class::<voice::Voice>()?;

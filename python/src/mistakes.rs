@@ -39,6 +39,19 @@ pub fn watched<T, E: Display>(work: impl FnOnce(fn() -> bool) -> Result<T, E>) -
     RAISED.take().map_or_else(|| done.map_err(wrong), Err)
 }
 
+/// What the code of the commands says beside its results, as Python's warnings. Where a warning is to be an error, that is raised at the
+/// end of the work.
+pub fn warn(said: &str) {
+    let said = ["note: ", "warning: "].iter().find_map(|mark| said.strip_prefix(mark)).unwrap_or(said);
+    let warned = Python::attach(|py| {
+        let warnings = py.import("warnings")?;
+        warnings.call_method1("warn", (said,)).map(drop)
+    });
+    if let Err(raised) = warned {
+        RAISED.set(Some(raised));
+    }
+}
+
 /// Where a name that is unknown differs from a flag by its case alone (h, H), that flag is meant.
 fn in_another_case(text: &str) -> Option<String> {
     let (what, rest) = text.split_once(" is called \"")?;

@@ -225,7 +225,7 @@ pub struct PlayedArgs {
     #[arg(long, value_enum, default_value_t = QualityArg::Live)]
     quality: QualityArg,
     /// Play the bore as it is built: otherwise a small delay for each note corrects its pitch. Finding the delays of an
-    /// instrument file takes up to a minute the first time
+    /// instrument file, or with --a4 outside 430..450 Hz, takes up to a minute the first time
     #[arg(long)]
     untuned: bool,
 }

@@ -68,7 +68,8 @@ def render(
     spaces.
 
     ``instrument`` is the clarinet in B flat unless one is chosen (see `chalumeau.instrument`). The first rendering with an
-    instrument of your own, or with ``a4`` outside 430..450 Hz, prepares it, up to a minute; the result is kept in your cache folder. ``rate`` is 1000..1536000 Hz.
+    instrument of your own, or with ``a4`` outside 430..450 Hz, prepares it, up to a minute; the result is kept in your cache
+    folder, and what the preparation found is told as a warning. ``rate`` is 1000..1536000 Hz.
     ``players`` is 1..16. ``channels`` is 1 or 2; without it there are two in a room, for several players and from two places, else one,
     as the command has it.
 
@@ -183,7 +184,6 @@ def _refuse_idle(settings: Mapping[str, Value] | None, named: Mapping[str, Value
     """Refuses what a live clarinet would ignore, or cannot do."""
     pairs(settings, named)
     idle = {each["id"]: each["group"] for each in parameters() if each["group"] in ("Players", "Room")}
-    known = {each["id"] for each in parameters()} | {"no_noise", "tempered", "natural", "quality", "untuned"}
     for name, value in {**(settings or {}), **named}.items():
         spelt = name.replace("-", "_")
         if value is None:
