@@ -1,6 +1,7 @@
 //! Measurements of sound: pitch, spectrum, onset, and the impedance behind a reflectance.
 //!
-//! Pure functions of slices of f64 samples (full scale 1.0) at a rate in Hz. They allocate and take milliseconds: for
+//! Pure functions of slices of f64 samples (full scale 1.0) at a rate in Hz. A rate or a pitch that is not above 0, or is none, has no
+//! result: `None`, or nothing. They allocate and take milliseconds: for
 //! renders, tests and plots, never for the audio thread.
 //!
 //! ```
@@ -29,6 +30,12 @@ pub(crate) mod slower;
 pub mod spectrum;
 pub mod steady_note;
 pub mod yin;
+
+/// Whether a number can be a sample rate or a pitch, Hz: above 0, and at most 1 GHz, so that counts of samples fit. All others, NaN among
+/// them, belong to no sound, and what is measured with them is `None`, empty or 0.
+pub(crate) fn is_hz(hz: f64) -> bool {
+    hz > 0.0 && hz <= 1e9
+}
 
 /// Samples as the functions here want them. Allocates.
 pub fn to_f64(samples: &[f32]) -> Vec<f64> {

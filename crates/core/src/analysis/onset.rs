@@ -6,15 +6,19 @@
 
 use crate::analysis::pitch::fundamental_hz;
 use crate::analysis::spectrum::{moving_rms, note_envelope};
-use crate::analysis::upper_median;
+use crate::analysis::{is_hz, upper_median};
 
 /// Share of the steady level that counts as speaking.
 const SPEAKING: f64 = 0.9;
 /// Window where no period is found, s.
 const WINDOW_S: f64 = 0.01;
 
-/// Time from 10 % to 90 % of the global maximum of the 10 ms envelope within the first 4 s. `None` for silence.
+/// Time from 10 % to 90 % of the global maximum of the 10 ms envelope within the first 4 s. `None` for silence, and at a
+/// rate that is not above 0.
 pub fn attack_s(samples: &[f64], rate_hz: f64) -> Option<f64> {
+    if !is_hz(rate_hz) {
+        return None;
+    }
     let envelope = note_envelope(samples, rate_hz);
     let loudest = envelope.iter().copied().fold(0.0, f64::max);
     if loudest <= 0.0 {
@@ -25,11 +29,15 @@ pub fn attack_s(samples: &[f64], rate_hz: f64) -> Option<f64> {
 }
 
 /// Time from `from_s` until the envelope first reaches 90 % of its steady level, the median over the last quarter of what
-/// follows `from_s`. The slice should end before the release. `None` if that is silence or nothing is left.
+/// follows `from_s`. The slice should end before the release. `None` if that is silence or nothing is left, and at a rate that is not
+/// above 0.
 ///
 /// The envelope is a moving rms over one period, centred (the period as found in that last quarter, 10 ms if none is):
 /// good to half a period.
 pub fn t90_s(samples: &[f64], rate_hz: f64, from_s: f64) -> Option<f64> {
+    if !is_hz(rate_hz) {
+        return None;
+    }
     let from = (from_s.max(0.0) * rate_hz).round() as usize;
     let note = samples.get(from..)?;
     let tail = note.len() - note.len() / 4;

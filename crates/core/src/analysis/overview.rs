@@ -15,6 +15,11 @@ const COLUMN_S: f64 = 0.08;
 /// Shortest distance between two looks at the pitch, s: a sixth of what one sees.
 const HOP_S: f64 = 0.01;
 
+/// Rates of a sound, Hz, as hosts have them: what lies outside would make windows of no sample, or of all memory.
+const RATES_HZ: (f64, f64) = (1_000.0, 1_536_000.0);
+/// What is no number counts as this rate, Hz.
+const USUAL_RATE_HZ: f64 = 48_000.0;
+
 /// Lowest and highest value of equal stretches of something that runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Envelope {
@@ -94,8 +99,10 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    /// For a sound of `samples` samples in `columns` columns. Allocates.
+    /// For a sound of `samples` samples in `columns` columns. A rate outside 1000..=1536000 Hz counts as the nearest that is inside, NaN as
+    /// 48000 Hz. Allocates.
     pub fn new(samples: usize, rate_hz: f64, columns: usize) -> Self {
+        let rate_hz = if rate_hz.is_nan() { USUAL_RATE_HZ } else { rate_hz.clamp(RATES_HZ.0, RATES_HZ.1) };
         let window = ((COLUMN_S * rate_hz) as usize).next_power_of_two();
         let row_hz = rate_hz / window as f64;
         let rows = ((HIGHEST_HZ.min(0.5 * rate_hz) / row_hz) as usize).min(window / 2) + 1;
@@ -265,6 +272,15 @@ mod tests {
         assert_eq!(outline.bins().len(), 10);
         assert_eq!((outline.bins()[1], outline.bins()[9]), ([0.0, 0.9], [-0.8, 0.0]));
         assert_eq!((outline.range(), outline.middle(9)), (Some([-0.8, 0.9]), 0.95));
+    }
+
+    #[test]
+    fn any_rate_makes_a_picture() {
+        for rate_hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+            let mut watcher = Watcher::new(1_000, rate_hz, 10);
+            watcher.see(&[0.1; 1_000]);
+            assert_eq!(watcher.finish().columns, 10, "{rate_hz}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-use crate::analysis::{HANN, cosine_window};
+use crate::analysis::{HANN, cosine_window, is_hz};
 use crate::maths;
 
 /// Step of the windows, s.
@@ -51,7 +51,8 @@ pub struct Wander {
 }
 
 impl Partial {
-    /// Watches the partial near `harmonic * f0_hz`.
+    /// Watches the partial near `harmonic * f0_hz`. Nothing is seen, and all that is asked is `None` or empty, where the samples are too
+    /// few for a window, or rate and `f0_hz` are not above 0.
     pub fn watch(samples: &[f64], rate_hz: f64, f0_hz: f64, harmonic: usize) -> Self {
         Self::watch_at(samples, rate_hz, f0_hz, harmonic as f64 * f0_hz)
     }
@@ -59,9 +60,12 @@ impl Partial {
     /// Watches `hz`, through windows for a tone of `f0_hz`.
     fn watch_at(samples: &[f64], rate_hz: f64, f0_hz: f64, hz: f64) -> Self {
         let len = ((PERIODS / f0_hz).max(SHORTEST_S) * rate_hz).round() as usize;
+        if !is_hz(rate_hz) || !is_hz(f0_hz) || hop(rate_hz) == 0 || len > samples.len() {
+            return Self { hz, values: Vec::new() };
+        }
         let window: Vec<f64> = cosine_window(len, &HANN).collect();
         let sum: f64 = window.iter().sum();
-        let hop = (HOP_S * rate_hz).round() as usize;
+        let hop = hop(rate_hz);
         let step = maths::complex::cis(-TAU * hz / rate_hz);
         let values = (0..)
             .map(|frame| frame * hop)
@@ -117,19 +121,28 @@ impl Partial {
     }
 }
 
+/// The step of the windows, samples; 0 at a rate that is too low.
+fn hop(rate_hz: f64) -> usize {
+    (HOP_S * rate_hz).round() as usize
+}
+
 impl Wander {
-    /// Of a steady segment of at least 1 s with the fundamental `f0_hz`; `None` if it is shorter or silent. Allocates.
+    /// Of a steady segment of at least 1 s with the fundamental `f0_hz`; `None` if it is shorter or silent, or if rate and `f0_hz` are not
+    /// above 0. Allocates.
     pub fn measure(segment: &[f64], rate_hz: f64, f0_hz: f64) -> Option<Self> {
         if (segment.len() as f64) < rate_hz {
             return None;
         }
         let [first, third, fifth] = [1, 3, 5].map(|h| Partial::watch(segment, rate_hz, f0_hz, h));
+        if first.values.is_empty() {
+            return None;
+        }
         let cents: Vec<f64> = first.cents().collect();
         let slow = band(&cents, (0.0, SLOW_HZ.1));
         let range_cents = slow.iter().copied().fold(f64::NEG_INFINITY, f64::max)
             - slow.iter().copied().fold(f64::INFINITY, f64::min);
         let of = |partial: &Partial| deviation(&band(&partial.level_db().collect::<Vec<_>>(), SLOW_HZ));
-        let hop = (HOP_S * rate_hz).round() as usize;
+        let hop = hop(rate_hz);
         let level: Vec<f64> = segment
             .chunks_exact(4 * hop)
             .map(|part| {
@@ -185,6 +198,13 @@ mod tests {
         assert!(wander.range_cents < 0.01 && wander.slow_cents < 0.003 && wander.fast_cents < 0.003);
         assert!(wander.level_db < 0.05 && wander.harmonics_db[2] < 0.01, "{wander:?}");
         assert_eq!(Wander::measure(&[0.0; 100], RATE_HZ, 233.1), None);
+        let second = tone(233.1, RATE_HZ, 1.0, &CLARINET_DB);
+        for no_hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+            assert_eq!(Wander::measure(&second, no_hz, 233.1), None, "{no_hz}");
+            assert_eq!(Wander::measure(&second, RATE_HZ, no_hz), None, "{no_hz}");
+            assert_eq!(Partial::watch(&second, no_hz, 233.1, 1).t90_s(), None, "{no_hz}");
+            assert_eq!(Partial::watch(&second, RATE_HZ, no_hz, 1).t90_s(), None, "{no_hz}");
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@
 //! Measured on 40 clarinet-like tones of 0.3 s from 147 to 2100 Hz, fundamental 10 dB below the third harmonic: worst
 //! error 1e-6 cent clean, 0.0001 cent with noise at -60 dB, 0.001 cent at -40 dB.
 
-use crate::analysis::{BLACKMAN_HARRIS, HANN, cosine_window, parabola, rms, without_mean};
+use crate::analysis::{BLACKMAN_HARRIS, HANN, cosine_window, is_hz, parabola, rms, without_mean};
 use crate::maths;
 use chalumeau_fft as fft;
 use num_complex::Complex64;
@@ -66,7 +66,7 @@ pub struct TrackPoint {
 /// Fundamental of a steady tone, 50..2500 Hz, or `None` if the slice has no period.
 ///
 /// Found in the last second, refined over the whole slice: on steady tones of 0.3 s and more within 0.1 cent. Slices
-/// under 10 periods are not refined (some cents).
+/// under 10 periods are not refined (some cents). `None` also at a rate that is not above 0.
 ///
 /// ```
 /// use chalumeau_core::analysis::pitch::fundamental_hz;
@@ -86,6 +86,9 @@ pub fn fundamental_near_hz(samples: &[f64], rate_hz: f64, wanted_hz: f64) -> Opt
 }
 
 fn fundamental_above_hz(samples: &[f64], rate_hz: f64, least_hz: f64) -> Option<f64> {
+    if !is_hz(rate_hz) {
+        return None;
+    }
     let tail = &samples[samples.len().saturating_sub(rate_hz as usize)..];
     let coarse = coarse_hz(tail, rate_hz, least_hz)?;
     Some(refine_hz(samples, rate_hz, coarse).unwrap_or(coarse))
@@ -113,14 +116,15 @@ pub fn refine_hz(samples: &[f64], rate_hz: f64, near_hz: f64) -> Option<f64> {
 }
 
 /// Normalised autocorrelation at the period of `f0_hz`: 1 for a perfectly periodic tone, 0 for noise, and 0 for a slice
-/// of less than two periods.
+/// of less than two periods or where rate and pitch are not above 0.
 ///
 /// The shifted copy is interpolated by a 64-point windowed sinc, good to 1e-6 below 0.4 of the rate.
 pub fn periodicity(samples: &[f64], rate_hz: f64, f0_hz: f64) -> f64 {
     const HALF: usize = 32;
     let period = rate_hz / f0_hz;
     let (whole, part) = (period.floor() as usize, period.fract());
-    if samples.len() < 2 * whole + 2 * HALF {
+    let needed = 2.0 * period.floor() + 2.0 * HALF as f64;
+    if !is_hz(rate_hz) || !is_hz(f0_hz) || (samples.len() as f64) < needed {
         return 0.0;
     }
     let samples = without_mean(samples);
@@ -159,6 +163,7 @@ pub fn periodicity(samples: &[f64], rate_hz: f64, f0_hz: f64) -> f64 {
 }
 
 /// Pitch and level every `hop_s` through windows of 60 ms (three periods of the lowest note), for plots: some cents.
+/// Nothing at a rate that is not above 0.
 pub fn pitch_track(samples: &[f64], rate_hz: f64, hop_s: f64) -> Vec<TrackPoint> {
     pitch_track_above(samples, rate_hz, hop_s, LOWEST_HZ)
 }
@@ -170,6 +175,9 @@ pub fn window_s(least_hz: f64) -> f64 {
 
 /// The same of notes from `least_hz` on, through windows of [`window_s`].
 pub fn pitch_track_above(samples: &[f64], rate_hz: f64, hop_s: f64, least_hz: f64) -> Vec<TrackPoint> {
+    if !is_hz(rate_hz) {
+        return Vec::new();
+    }
     let window = (window_s(least_hz) * rate_hz).round() as usize;
     let hop = (hop_s * rate_hz).max(1.0);
     (0..)
@@ -409,6 +417,20 @@ mod tests {
             assert!(periodicity(&clean, 48_000.0, 1.37 * f0_hz) < 0.8);
         }
         assert!(periodicity(&noise(1.0, 48_000), 48_000.0, 200.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn what_is_no_rate_has_no_pitch() {
+        let sound = tone(440.0, 48_000.0, 0.2, &CLARINET_DB);
+        for no_hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+            assert_eq!(fundamental_hz(&sound, no_hz), None, "{no_hz}");
+            assert_eq!(fundamental_near_hz(&sound, no_hz, 440.0), None, "{no_hz}");
+            assert_eq!(refine_hz(&sound, no_hz, 440.0), None, "{no_hz}");
+            assert_eq!(refine_hz(&sound, 48_000.0, no_hz), None, "{no_hz}");
+            assert_eq!(periodicity(&sound, no_hz, 440.0), 0.0, "{no_hz}");
+            assert_eq!(periodicity(&sound, 48_000.0, no_hz), 0.0, "{no_hz}");
+            assert!(pitch_track(&sound, no_hz, 0.01).is_empty(), "{no_hz}");
+        }
     }
 
     #[test]

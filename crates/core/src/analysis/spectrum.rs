@@ -5,7 +5,7 @@
 //! it leaves out: peak picking under-reads upper harmonics of an unsteady pitch by several dB; the centroid does not.
 //! Levels in dB, full scale 1.0, frequencies in Hz.
 
-use crate::analysis::{BLACKMAN_HARRIS, HANN, cosine_window, rms, without_mean};
+use crate::analysis::{BLACKMAN_HARRIS, HANN, cosine_window, is_hz, rms, without_mean};
 use crate::maths;
 use chalumeau_fft as fft;
 use std::ops::Range;
@@ -47,8 +47,9 @@ pub struct PowerSpectrum {
 }
 
 /// Moving root mean square over `window_s`, centred, one value per sample; at the edges over the samples there are.
+/// At least one sample is seen, whatever the length and the rate, and at most all.
 pub fn moving_rms(samples: &[f64], rate_hz: f64, window_s: f64) -> Vec<f64> {
-    let window = ((window_s * rate_hz).round() as usize).max(1);
+    let window = ((window_s * rate_hz).round() as usize).clamp(1, 2 * samples.len() + 2);
     let mut sums = Vec::with_capacity(samples.len() + 1);
     let mut sum = 0.0;
     sums.push(sum);
@@ -71,8 +72,11 @@ pub(crate) fn note_envelope(samples: &[f64], rate_hz: f64) -> Vec<f64> {
 }
 
 /// Steady part of a note within its first 4 s: from the first to the last sample where the 10 ms envelope is at least
-/// half its maximum, less 100 ms at both ends. `None` under 200 ms.
+/// half its maximum, less 100 ms at both ends. `None` under 200 ms, and at a rate that is not above 0.
 pub fn steady_segment(samples: &[f64], rate_hz: f64) -> Option<Range<usize>> {
+    if !is_hz(rate_hz) {
+        return None;
+    }
     let envelope = note_envelope(samples, rate_hz);
     let half = 0.5 * envelope.iter().copied().fold(0.0, f64::max);
     if half <= 0.0 {
@@ -247,6 +251,12 @@ mod tests {
         assert_eq!(steady_segment(&tone(440.0, RATE_HZ, 0.39, &[0.0]), RATE_HZ), None);
         assert_eq!(steady_segment(&vec![0.0; 44_100], RATE_HZ), None);
         assert_eq!(steady_segment(&[], RATE_HZ), None);
+        let sound = tone(440.0, RATE_HZ, 0.5, &[0.0]);
+        for no_hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+            assert_eq!(steady_segment(&sound, no_hz), None, "{no_hz}");
+            assert_eq!(moving_rms(&sound, no_hz, 0.01).len(), sound.len(), "{no_hz}");
+            assert_eq!(moving_rms(&sound, RATE_HZ, no_hz).len(), sound.len(), "{no_hz}");
+        }
         assert!(steady_segment(&tone(440.0, RATE_HZ, 0.41, &[0.0]), RATE_HZ).is_some());
     }
 

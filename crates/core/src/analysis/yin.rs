@@ -3,7 +3,7 @@
 //! [`pitch`](super::pitch) is more exact and is used everywhere else. This estimator exists because a comparison with
 //! recordings must find the same period in the same way.
 
-use crate::analysis::without_mean;
+use crate::analysis::{is_hz, without_mean};
 use chalumeau_fft as fft;
 use num_complex::Complex64;
 
@@ -17,7 +17,7 @@ const DEEPEST: f64 = 0.3;
 
 /// Fundamental of a slice of about 1 s, Hz: the first dip of the cumulative-mean-normalised difference below 0.1, followed
 /// down to its minimum (else the deepest one, if at most 0.3), refined by a parabola on the difference. `None` if there is
-/// neither, if the slice is too short, or if a sample or the rate is not finite. Allocates.
+/// neither, if the slice is too short, if a sample is not finite, or if the rate is not a number of Hz. Allocates.
 ///
 /// ```
 /// use chalumeau_core::analysis::yin;
@@ -26,7 +26,7 @@ const DEEPEST: f64 = 0.3;
 /// assert!((yin::fundamental_hz(&tone, 44_100.0).unwrap() - 440.0).abs() < 0.05);
 /// ```
 pub fn fundamental_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
-    if !rate_hz.is_finite() || !samples.iter().all(|sample| sample.is_finite()) {
+    if !is_hz(rate_hz) || !samples.iter().all(|sample| sample.is_finite()) {
         return None;
     }
     let longest = (rate_hz / LOWEST_HZ) as usize + 2;
