@@ -202,7 +202,7 @@ fn equal_travel_moves_the_map_and_not_the_knob() {
         let standard = FeelTable::new(
             &BORE,
             &FeelDesign { equal_travel: false, ..design },
-            &PlayedReed::quasi_static(0.3),
+            &PlayedReed::quasi_static(0.3).unwrap(),
             &TorqueLimits::default(),
         )
         .unwrap();
@@ -642,7 +642,7 @@ fn another_instrument_without_c5_takes_the_middle_of_its_chart() {
     let table = FeelTable::new(
         &bore,
         &FeelDesign::default(),
-        &PlayedReed::quasi_static(0.3),
+        &PlayedReed::quasi_static(0.3).unwrap(),
         &TorqueLimits::default(),
     )
     .unwrap();

@@ -20,7 +20,7 @@
 //! // About one second: the bore of the built-in clarinet.
 //! let bore = RequirementSolver::new(&InstrumentFile::built_in(), Air::default(), 440.0);
 //! // Milliseconds: any reed and any design.
-//! let reed = PlayedReed::quasi_static(0.3);
+//! let reed = PlayedReed::quasi_static(0.3)?;
 //! let design = FeelDesign { contrast: 2.0, ..FeelDesign::default() };
 //! let table = FeelTable::new(&bore, &design, &reed, &TorqueLimits::default())?;
 //!
@@ -31,7 +31,7 @@
 //! let c5 = table.reference();
 //! let onset_pa = c5.requirement.map(|required| required.p_req_pa);
 //! assert!((c5.map.pressure_pa(120.0) - onset_pa.unwrap_or_default()).abs() < 1.0);
-//! # Ok::<(), chalumeau_core::haptics::FeelRefused>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod admittance;

@@ -100,7 +100,7 @@ impl FeelTable {
         let Some(own) = asked.get(reference).copied().flatten() else {
             return Err(FeelRefused::Silent { zeta: reed.flow_strength() });
         };
-        let standard_reed = PlayedReed::quasi_static(ZETA_REFERENCE);
+        let standard_reed = PlayedReed::of_zeta(ZETA_REFERENCE);
         // How many degrees a pascal is belongs to the knob. The reference reed fixes it, whatever reed is played.
         let degrees_per_pa = match design.law {
             TorqueLaw::Flow => {

@@ -3,8 +3,12 @@
 //! [`crate::instrument::feel_inputs::played_reed`] makes one from the settings of the instrument, with the player's rule for the
 //! lip.
 
+use crate::reed::law::ReedError;
 use crate::reed::physical::P_REF_PA;
 use crate::reed::{Lip, ReedLaw};
+
+/// Range of the embouchure parameter zeta, that of [`Settings::zeta`](crate::instrument::Settings::zeta).
+const ZETAS: (f64, f64) = (0.05, 0.9);
 
 /// The reed as it is played. Sound and feel use the same one.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,8 +28,16 @@ pub struct PlayedReed {
 }
 
 impl PlayedReed {
-    /// The reference reed without inertia, on a bore without jets, with the embouchure `zeta`.
-    pub fn quasi_static(zeta: f64) -> Self {
+    /// The reference reed without inertia, on a bore without jets, with the embouchure `zeta`, 0.05..=0.9.
+    ///
+    /// # Errors
+    /// [`ReedError::Zeta`] if it lies outside.
+    pub fn quasi_static(zeta: f64) -> Result<Self, ReedError> {
+        if (ZETAS.0..=ZETAS.1).contains(&zeta) { Ok(Self::of_zeta(zeta)) } else { Err(ReedError::Zeta(zeta)) }
+    }
+
+    /// The same with a zeta that is in its range.
+    pub(super) fn of_zeta(zeta: f64) -> Self {
         Self { law: ReedLaw::default(), zeta, lay: 0.0, jet_loss: 0.0, lips: Vec::new() }
     }
 
@@ -50,9 +62,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn no_flow_or_a_flow_backwards_is_no_reed() {
+        assert!([0.05, 0.3, 0.9].into_iter().all(|zeta| PlayedReed::quasi_static(zeta).is_ok()));
+        for zeta in [0.0, -1.0, 1.1, f64::NAN, f64::INFINITY] {
+            let said = PlayedReed::quasi_static(zeta).unwrap_err().to_string();
+            assert!(said.contains("zeta") && said.contains("0.05..0.9"), "{said}");
+        }
+    }
+
+    #[test]
     fn reference_reed_has_the_strength_it_was_given() {
-        assert!((PlayedReed::quasi_static(0.3).flow_strength() - 0.3).abs() < 1e-12);
-        let wide = PlayedReed { law: ReedLaw::coupled(3.0, 1.0).unwrap(), ..PlayedReed::quasi_static(0.3) };
+        assert!((PlayedReed::of_zeta(0.3).flow_strength() - 0.3).abs() < 1e-12);
+        let wide = PlayedReed { law: ReedLaw::coupled(3.0, 1.0).unwrap(), ..PlayedReed::of_zeta(0.3) };
         let ratio = 3.0 / crate::reed::law::H_INIT;
         assert!((wide.flow_strength() - 0.3 * ratio * ratio).abs() < 1e-12);
         let loud = PlayedReed { law: ReedLaw::coupled(3.0, 2.0).unwrap(), ..wide.clone() };

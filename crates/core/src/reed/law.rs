@@ -41,7 +41,7 @@ pub struct ReedLaw {
     a: f64,
 }
 
-/// Why a law is refused: one of its numbers is out of range.
+/// Why a law or a reed is refused: one of its numbers is out of range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ReedError {
     /// H outside its range.
@@ -53,6 +53,9 @@ pub enum ReedError {
     /// A outside its range.
     #[error("A (amplitude) must lie in 0..10, got {0}; the reference is 1")]
     A(f64),
+    /// zeta outside its range.
+    #[error("zeta (flow strength) must lie in 0.05..0.9, got {0}; the reference is 0.3")]
+    Zeta(f64),
 }
 
 impl ReedLaw {
