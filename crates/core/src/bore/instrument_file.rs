@@ -12,6 +12,7 @@ use serde::Deserialize;
 use crate::units::midi_of_name;
 use crate::units::{REFERENCE_RADIUS_M, SoundingNote, WrittenNote};
 
+mod by_hand;
 mod csv;
 mod error;
 mod limits;
@@ -36,7 +37,8 @@ const SHORTEST_MM: f64 = 0.01;
 /// What lengths may lose by being written with few digits, m.
 const ROUNDING_M: f64 = 2e-9;
 
-/// One instrument: its bore, tone holes and fingering chart, in SI units.
+/// One instrument: its bore, tone holes and fingering chart, in SI units. [`parse`](Self::parse) gives one that is whole; of one that is
+/// made or changed by hand, [`check`](Self::check) says whether it is.
 ///
 /// ```
 /// use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -199,7 +201,8 @@ impl InstrumentFile {
     /// The same instrument `factor` times as large in every direction: bore, holes, chimneys, nominal bore, and the air
     /// moving with the reed by the cube. Without losses all its resonances are those of the original divided by `factor`;
     /// wall losses are a little smaller in a larger bore. Names, chart and transposition stay: what the notes are called
-    /// is the caller's to say. `factor` is finite and above 0; 1 gives the same instrument bit by bit.
+    /// is the caller's to say. `factor` is finite and above 0; 1 gives the same instrument bit by bit. What other factors give, or factors
+    /// that lead out of the ranges of a file, [`check`](Self::check) refuses.
     pub fn scaled(&self, factor: f64) -> Self {
         let mut file = self.clone();
         for segment in &mut file.bore {
@@ -270,7 +273,7 @@ impl InstrumentFile {
         let mut holes: Vec<ToneHole> = Vec::with_capacity(raw.len());
         for (index, Lined { line, value: hole }) in raw.into_iter().enumerate() {
             let what = format!("hole {} ({})", index + 1, hole.name);
-            let place = Place { file: words.hole.clone(), line: Some(line), what };
+            let place = Place { file: words.hole.clone(), line, what };
             if hole.name.is_empty() || hole.name.contains(char::is_whitespace) {
                 let expected = "one word, as the fingerings use it";
                 return Err(word(&place, &words.hole_name, &hole.name, expected));
@@ -331,7 +334,7 @@ impl InstrumentFile {
         let mut chart: Vec<Fingering> = Vec::with_capacity(raw.len());
         for (number, Lined { line, value: fingering }) in raw.into_iter().enumerate() {
             let what = format!("fingering {} ({})", number + 1, fingering.written);
-            let place = Place { file: words.fingering.clone(), line: Some(line), what };
+            let place = Place { file: words.fingering.clone(), line, what };
             let Some(written) = midi_of_name(&fingering.written).map(WrittenNote) else {
                 let expected = "a note like E3, F#4 or Bb4, from C-1 to G9";
                 return Err(word(&place, &words.written, &fingering.written, expected));
@@ -395,7 +398,7 @@ impl InstrumentFile {
 fn segments(raw: Vec<Lined<RawSegment>>, words: &Words) -> Result<Vec<BoreSegment>, InstrumentError> {
     let place = |index: usize, segment: &Lined<RawSegment>| {
         let what = format!("bore segment {} ({})", index + 1, segment.value.part);
-        Place { file: words.bore.clone(), line: Some(segment.line), what }
+        Place { file: words.bore.clone(), line: segment.line, what }
     };
     // First, because a whole bore in the wrong unit shows best in its length.
     if let Some(last) = raw.last() {

@@ -8,7 +8,7 @@ use crate::bore::cells::Cells;
 use crate::bore::cells::CellsError;
 use crate::bore::cells::networks;
 use crate::bore::context_fingerings::ContextFingerings;
-use crate::bore::instrument_file::{Fingering, InstrumentFile};
+use crate::bore::instrument_file::{Fingering, InstrumentError, InstrumentFile};
 use crate::bore::lattice::LatticeCoeffs;
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::concert_pitch::A4_RANGE_HZ;
@@ -89,6 +89,9 @@ pub enum BuildError {
     /// The caller ended the preparation.
     #[error("cancelled")]
     Cancelled,
+    /// An instrument made by hand that [`InstrumentFile::check`] refuses.
+    #[error(transparent)]
+    Instrument(#[from] InstrumentError),
     /// The bore cannot be cut into cells of the lattice.
     #[error(transparent)]
     Cells(#[from] CellsError),

@@ -72,7 +72,9 @@ const HEARD: f64 = 0.05;
 const TUNED: f64 = 0.6;
 
 /// Prepares one instrument. Every method allocates, and refuses a host rate or an A4 out of range with
-/// [`BuildError::Rate`] or [`BuildError::A4`].
+/// [`BuildError::Rate`] or [`BuildError::A4`], and an instrument that [`InstrumentFile::check`] refuses with [`BuildError::Instrument`].
+///
+/// [`InstrumentFile::check`]: crate::bore::instrument_file::InstrumentFile::check
 #[derive(Clone, Copy)]
 pub struct Preparation<'a> {
     wanted: &'a Wanted,

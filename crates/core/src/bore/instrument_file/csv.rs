@@ -363,7 +363,7 @@ fn read_bore(sheet: Sheet<'_>, words: &mut Words) -> Result<Vec<Lined<RawSegment
             diameter_start_mm: table.mm(line, row, &start)?,
             diameter_end_mm: table.mm(line, row, &end)?,
         };
-        bore.push(Lined { line, value });
+        bore.push(Lined { line: Some(line), value });
     }
     [words.x_start, words.x_end, words.width_start, words.width_end] =
         [x_start.word, x_end.word, start.word, end.word];
@@ -440,7 +440,7 @@ fn read_holes(sheet: Sheet<'_>, words: &mut Words) -> Result<Vec<Lined<RawHole>>
             let (place, what) = (place.to_string(), "hole".to_owned());
             return Err(InstrumentError::Duplicate { place, what, name: value.name }.into());
         }
-        holes.push(Lined { line, value });
+        holes.push(Lined { line: Some(line), value });
     }
     words.hole_name = Word::plain(&table.columns[name]);
     [words.x, words.hole_width, words.chimney] = [x.word, width.word, chimney.word];

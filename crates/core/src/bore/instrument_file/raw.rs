@@ -5,10 +5,10 @@ use toml::Spanned;
 
 use super::HoleKind;
 
-/// A line of the file, from 1, and what stands there.
+/// A line of the file, from 1, if it is of a file, and what stands there.
 #[derive(Clone, Debug)]
 pub(super) struct Lined<T> {
-    pub(super) line: u64,
+    pub(super) line: Option<u64>,
     pub(super) value: T,
 }
 
@@ -53,7 +53,7 @@ fn lined<T>(entries: Vec<Spanned<T>>, text: &str) -> Vec<Lined<T>> {
         }
         line += text.as_bytes()[at..start].iter().filter(|&&byte| byte == b'\n').count() as u64;
         at = start;
-        lines.push(Lined { line, value: entry.into_inner() });
+        lines.push(Lined { line: Some(line), value: entry.into_inner() });
     }
     lines
 }

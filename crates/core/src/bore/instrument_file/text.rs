@@ -13,7 +13,7 @@ const DIGITS: usize = 6;
 impl InstrumentFile {
     /// The instrument as TOML, see `docs/instrument-file.md`. [`parse`](Self::parse) of it gives the same instrument, every
     /// length to 1e-9 m and the reed volume to 1e-15 m3; exactly the same when it was itself read from a file with
-    /// at most six decimals of a millimetre.
+    /// at most six decimals of a millimetre. Of an instrument that [`check`](Self::check) refuses it may be a text that cannot be read.
     pub fn to_toml(&self) -> String {
         // Writing to a `String` cannot fail.
         let mut out = String::new();
@@ -88,10 +88,7 @@ impl InstrumentFile {
              # that sounds. maker_open is the fingering in the maker's chart, where the note is played with another.\n",
         );
         for (index, fingering) in self.fingerings.iter().enumerate() {
-            let names = |open: &[bool]| {
-                let open = self.holes.iter().zip(open).filter(|(_, open)| **open);
-                quoted(&open.map(|(hole, _)| hole.name.as_str()).collect::<Vec<_>>().join(" "))
-            };
+            let names = |open: &[bool]| quoted(&self.names(open));
             let _ = writeln!(
                 out,
                 "{}[[fingering]]\nwritten = \"{}\"\nregister = {}\nmode = {}\nopen = {}",

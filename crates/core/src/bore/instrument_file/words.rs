@@ -97,7 +97,7 @@ impl Word {
 }
 
 /// The same number to 12 digits.
-fn tidy(value: f64) -> f64 {
+pub(super) fn tidy(value: f64) -> f64 {
     format!("{value:.11e}").parse().unwrap_or(value)
 }
 

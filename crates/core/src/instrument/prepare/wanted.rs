@@ -109,12 +109,13 @@ impl Wanted {
         Ok(Key::of(&all))
     }
 
-    /// The lattice's rate and the pitch of A4 to tune for, Hz, if both are in range.
+    /// The lattice's rate and the pitch of A4 to tune for, Hz, if both are in range and the instrument is one.
     pub(super) fn checked(&self) -> Result<(f64, f64), BuildError> {
         let rate_hz = self.internal_rate_hz()?;
         if !(A4_RANGE_HZ.0..=A4_RANGE_HZ.1).contains(&self.a4_hz) {
             return Err(BuildError::A4(self.a4_hz));
         }
+        self.file.check()?;
         Ok((rate_hz, self.tuned_a4_hz()))
     }
 }

@@ -207,7 +207,7 @@ pub(super) fn read_chart(
             maker_open: None,
             fingers: columns.fingers.map(|index| row.text(index)).unwrap_or_default().to_owned(),
         };
-        notes.push(Lined { line, value });
+        notes.push(Lined { line: Some(line), value });
     }
     words.written = Word::plain(&table.columns[columns.written]);
     Ok(Chart { notes, transposition, has_modes: columns.mode.is_some() })
