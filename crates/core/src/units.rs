@@ -70,6 +70,10 @@ impl Default for Air {
     }
 }
 
+/// Widest range of the pitch of A4 that theory is asked for, Hz. What sounds is made for a narrower one,
+/// [`A4_RANGE_HZ`](crate::instrument::concert_pitch::A4_RANGE_HZ).
+pub const A4_OF_THEORY_HZ: (f64, f64) = (100.0, 1_000.0);
+
 /// Radius of the bore that dimensionless figures (zeta, |Z|/Zc) refer to, m: that of a B flat clarinet. An instrument file
 /// may name another (`nominal_diameter_mm`).
 pub const REFERENCE_RADIUS_M: f64 = 7.45e-3;

@@ -7,7 +7,7 @@
 
 use crate::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, MAX_HOLES, ToneHole};
 use crate::bore::transfer_matrix::TransferMatrix;
-use crate::units::{Air, WrittenNote, cents};
+use crate::units::{A4_OF_THEORY_HZ, Air, WrittenNote, cents};
 
 /// Rounds of moving everything; each brings the notes several times nearer.
 const ROUNDS: usize = 40;
@@ -61,9 +61,12 @@ pub enum CylinderError {
     /// A note, or its twelfth, that MIDI does not have.
     #[error("{0} (or its twelfth) does not sound between C-1 and G9")]
     Range(WrittenNote),
-    /// A pitch of A4 that no cylinder is built for.
-    #[error("A4 of {0} Hz; it must be 100 to 1000 Hz")]
+    /// A pitch of A4, Hz, outside [`A4_OF_THEORY_HZ`].
+    #[error("A4 must lie in {low}..{high} Hz, got {0}", low = A4_OF_THEORY_HZ.0, high = A4_OF_THEORY_HZ.1)]
     A4(f64),
+    /// A size that no instrument file can have, in the words of [`InstrumentFile::check`].
+    #[error("{0}")]
+    Size(String),
     /// Holes wider than the bore.
     #[error("holes of {hole_mm} mm are wider than a bore of {bore_mm} mm")]
     TooWide {
@@ -162,15 +165,15 @@ impl Cylinder {
     }
 
     fn possible(&self) -> Result<(), CylinderError> {
-        if !(100.0..=1_000.0).contains(&self.a4_hz) {
-            return Err(CylinderError::A4(self.a4_hz));
-        }
         let most = if self.vent_radius_m.is_some() { MAX_HOLES } else { MAX_HOLES + 1 };
         if self.notes.is_empty() || self.notes.len() > most {
             return Err(CylinderError::Notes { given: self.notes.len(), most });
         }
         if let Some(pair) = self.notes.windows(2).find(|pair| pair[0] >= pair[1]) {
             return Err(CylinderError::Order { first: pair[0], second: pair[1] });
+        }
+        if !(A4_OF_THEORY_HZ.0..=A4_OF_THEORY_HZ.1).contains(&self.a4_hz) {
+            return Err(CylinderError::A4(self.a4_hz));
         }
         let highest = |note: &WrittenNote| match self.vent_radius_m {
             Some(_) => WrittenNote(note.0.saturating_add(TWELFTH).min(128)),
@@ -184,7 +187,11 @@ impl Cylinder {
             let hole_m = self.vent_radius_m.unwrap_or(0.0).max(self.hole_radius_m);
             return Err(CylinderError::TooWide { hole_mm: 2e3 * hole_m, bore_mm: 2e3 * self.radius_m });
         }
-        Ok(())
+        // Two notes with all sizes: places and names are worked out later.
+        let notes = vec![WrittenNote(60), WrittenNote(72)];
+        let two = Self { name: "cylinder".to_owned(), notes, transposition: 0, ..self.clone() };
+        let sizes = two.with_ends(&[0.4, 0.2]);
+        sizes.check().map_err(|error| CylinderError::Size(error.to_string()))
     }
 
     /// The instrument with its air column ending here for each note; holes from the reed to the bell.
@@ -334,6 +341,20 @@ mod tests {
             message(Cylinder { hole_radius_m: 8e-3, ..cylinder(&[50, 52]) })
                 .contains("wider than a bore of 14.9")
         );
+        for a4_hz in [0.0, -440.0, 99.0, 1e9, f64::NAN] {
+            assert!(message(Cylinder { a4_hz, ..cylinder(&[50, 52]) }).contains("A4 must lie in 100..1000"));
+        }
+        for size in [0.0, -1e-3, f64::NAN, f64::INFINITY] {
+            for wrong in [
+                Cylinder { radius_m: size, hole_radius_m: size, ..cylinder(&[50, 52]) },
+                Cylinder { hole_radius_m: size.min(1e-9), ..cylinder(&[50, 52]) },
+                Cylinder { chimney_m: size, ..cylinder(&[50, 52]) },
+                Cylinder { vent_radius_m: Some(size.min(1e-9)), ..cylinder(&[50, 52]) },
+            ] {
+                let said = message(wrong);
+                assert!(said.contains("it must be"), "{size}: {said}");
+            }
+        }
         let crowd = Cylinder { hole_radius_m: 7e-3, ..cylinder(&[70, 71, 72, 73, 74, 75, 76, 77]) };
         assert!(message(crowd).contains("overlap"));
         assert!(message(Cylinder { hole_radius_m: 0.3e-3, ..cylinder(&[50, 69]) }).contains("wider"));
