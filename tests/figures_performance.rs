@@ -520,7 +520,7 @@ fn turns_of(table: &FeelTable, closing_kpa: f64) -> Figure {
 #[test]
 fn breath_and_feel_are_figures_of_one_instrument() {
     let (file, settings) = (InstrumentFile::built_in(), Settings { noise: 0.0, ..Settings::physical() });
-    let bore = RequirementSolver::new(&file, Air::default(), 440.0);
+    let bore = RequirementSolver::new(&file, Air::default(), 440.0).unwrap();
     let reed = played_reed(&file, 440.0, &settings);
     let closing_kpa = 1e-3 * reed.closing_pa();
     let asked = bore.with(&reed);

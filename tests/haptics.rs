@@ -638,7 +638,7 @@ fn every_allowed_setting_gives_a_feel_or_a_reason() {
 fn another_instrument_without_c5_takes_the_middle_of_its_chart() {
     let mut file = MODEL.file.clone();
     file.fingerings.retain(|fingering| fingering.written != WrittenNote(72));
-    let bore = RequirementSolver::new(&file, Air::default(), 440.0);
+    let bore = RequirementSolver::new(&file, Air::default(), 440.0).unwrap();
     let table = FeelTable::new(
         &bore,
         &FeelDesign::default(),
@@ -659,7 +659,7 @@ fn notes_require_the_same_at_another_a4() {
     let required = |a4_hz: f64| {
         let built = file.scaled(440.0 / a4_hz);
         let reed = played_reed(&built, a4_hz, &Settings::default());
-        RequirementSolver::new(&built, Air::default(), a4_hz).with(&reed)
+        RequirementSolver::new(&built, Air::default(), a4_hz).unwrap().with(&reed)
     };
     let standard = required(440.0);
     for a4_hz in [392.0, 415.0, 466.0] {

@@ -95,7 +95,7 @@ pub struct ReedInAirArgs {
 
 impl ReedInAirArgs {
     /// The bore in this air, and the reed as it is played on it.
-    pub fn bore_and_reed(&self, file: &InstrumentFile) -> (RequirementSolver, PlayedReed) {
+    pub fn bore_and_reed(&self, file: &InstrumentFile) -> Result<(RequirementSolver, PlayedReed), Failure> {
         let standard = Settings::default();
         let settings = Settings {
             zeta: self.zeta,
@@ -106,13 +106,15 @@ impl ReedInAirArgs {
             coupled: self.k.is_none(),
             ..standard
         };
-        (RequirementSolver::new(file, self.air.air(), A4_HZ), played_reed(file, A4_HZ, &settings))
+        let bore = RequirementSolver::new(file, self.air.air(), A4_HZ)
+            .map_err(|error| Failure::Usage(error.to_string()))?;
+        Ok((bore, played_reed(file, A4_HZ, &settings)))
     }
 }
 
 impl FeltReedArgs {
     /// The bore in this air, and the reed as it is played on it.
-    pub fn bore_and_reed(&self, file: &InstrumentFile) -> (RequirementSolver, PlayedReed) {
+    pub fn bore_and_reed(&self, file: &InstrumentFile) -> Result<(RequirementSolver, PlayedReed), Failure> {
         self.reed.bore_and_reed(file)
     }
 
@@ -120,7 +122,7 @@ impl FeltReedArgs {
     pub fn feel(&self, file: &InstrumentFile) -> Result<FeelTable, Failure> {
         let design = self.feel.design(file)?;
         let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
-        let (bore, reed) = self.bore_and_reed(file);
+        let (bore, reed) = self.bore_and_reed(file)?;
         FeelTable::new(&bore, &design, &reed, &limits).map_err(in_flags)
     }
 }

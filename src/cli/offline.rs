@@ -155,7 +155,7 @@ pub fn bore_and_reed(
     pairs: &Pairs,
     instrument: &InstrumentFile,
 ) -> Result<(RequirementSolver, PlayedReed), String> {
-    Ok(read::<ReedInAirArgs>(pairs)?.bore_and_reed(instrument))
+    read::<ReedInAirArgs>(pairs)?.bore_and_reed(instrument).map_err(|failure| failure.to_string())
 }
 
 /// The rows of a plan of `chalumeau batch`, in the order of its files: for each row the names and values.

@@ -18,7 +18,7 @@
 //! use chalumeau_core::units::Air;
 //!
 //! // About one second: the bore of the built-in clarinet.
-//! let bore = RequirementSolver::new(&InstrumentFile::built_in(), Air::default(), 440.0);
+//! let bore = RequirementSolver::new(&InstrumentFile::built_in(), Air::default(), 440.0)?;
 //! // Milliseconds: any reed and any design.
 //! let reed = PlayedReed::quasi_static(0.3)?;
 //! let design = FeelDesign { contrast: 2.0, ..FeelDesign::default() };
@@ -53,5 +53,5 @@ pub use feel_parameters::{Feel, FieldRange, OutOfRange, TorqueLaw};
 pub use feel_refused::FeelRefused;
 pub use feel_table::{FeelTable, Landmarks, NoteFeel};
 pub use played_reed::PlayedReed;
-pub use requirement::{NoteRequirement, RequirementSolver};
+pub use requirement::{NoteRequirement, RequirementError, RequirementSolver};
 pub use torque_limits::TorqueLimits;

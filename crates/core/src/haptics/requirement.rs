@@ -14,7 +14,7 @@
 //!
 //! `docs/feel.md` lists what this model leaves out and its errors against the played instrument.
 
-use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::instrument_file::{InstrumentError, InstrumentFile};
 use crate::bore::lattice::LatticeCoeffs;
 use crate::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use crate::haptics::admittance::{AdmittanceGrid, swept_s};
@@ -22,7 +22,7 @@ use crate::haptics::extinction::EffectiveImpedance;
 use crate::haptics::onset;
 use crate::haptics::onset::OnsetReed;
 use crate::haptics::played_reed::PlayedReed;
-use crate::units::{Air, WrittenNote, cents};
+use crate::units::{A4_OF_THEORY_HZ, Air, WrittenNote, cents};
 
 /// The grid of a note reaches from this share of the lowest note's frequency to the larger of two frequencies: this multiple
 /// of the lowest note and this multiple of the note. The lip puts the resonance of the reed there, above which nothing
@@ -83,11 +83,33 @@ struct BoreNote {
     mode: Option<(f64, EffectiveImpedance)>,
 }
 
+/// Why a bore is not analysed.
+#[derive(Debug, thiserror::Error)]
+pub enum RequirementError {
+    /// A pitch of A4, Hz, outside [`A4_OF_THEORY_HZ`].
+    #[error("A4 must lie in {low}..{high} Hz, got {0}", low = A4_OF_THEORY_HZ.0, high = A4_OF_THEORY_HZ.1)]
+    A4(f64),
+    /// An instrument made by hand that is none.
+    #[error(transparent)]
+    Instrument(#[from] InstrumentError),
+}
+
 impl RequirementSolver {
-    /// Analyses the bore of an instrument that plays at `a4_hz`, 100..=1000 Hz; a value outside counts as the nearest, and one that is no
-    /// number as 440. About one second for 46 notes. Allocates; not for the audio thread.
-    pub fn new(file: &InstrumentFile, air: Air, a4_hz: f64) -> Self {
-        let a4_hz = if a4_hz.is_nan() { 440.0 } else { a4_hz.clamp(100.0, 1_000.0) };
+    /// Analyses the bore of an instrument that plays at `a4_hz`, 100..=1000 Hz: about one second for 46 notes. Allocates; not for the
+    /// audio thread.
+    ///
+    /// # Errors
+    /// [`RequirementError`] if A4 lies outside, or if [`InstrumentFile::check`] refuses the instrument.
+    pub fn new(file: &InstrumentFile, air: Air, a4_hz: f64) -> Result<Self, RequirementError> {
+        if !(A4_OF_THEORY_HZ.0..=A4_OF_THEORY_HZ.1).contains(&a4_hz) {
+            return Err(RequirementError::A4(a4_hz));
+        }
+        file.check()?;
+        Ok(Self::of_checked(file, air, a4_hz))
+    }
+
+    /// The same of an instrument and a pitch that were checked.
+    pub(crate) fn of_checked(file: &InstrumentFile, air: Air, a4_hz: f64) -> Self {
         let matrix = TransferMatrix::new(file, air);
         let sounding_hz = |written: WrittenNote| file.sounding(written).frequency_hz(a4_hz);
         let lowest_hz = sounding_hz(file.lowest());
@@ -209,9 +231,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_no_pitch_or_no_instrument_is_refused() {
+        let (file, air) = (InstrumentFile::built_in(), Air::default());
+        for a4_hz in [0.0, -440.0, f64::NAN, 1e9] {
+            let said = RequirementSolver::new(&file, air, a4_hz).unwrap_err().to_string();
+            assert!(said.contains("A4 must lie in 100..1000 Hz"), "{said}");
+        }
+        let silent = InstrumentFile { fingerings: Vec::new(), ..file };
+        assert!(RequirementSolver::new(&silent, air, 440.0).unwrap_err().to_string().contains("fingering"));
+    }
+
+    #[test]
     fn stored_admittance_is_the_bore() {
         let (file, air) = (InstrumentFile::built_in(), Air::default());
-        let (bore, solver) = (TransferMatrix::new(&file, air), RequirementSolver::new(&file, air, 440.0));
+        let (bore, solver) =
+            (TransferMatrix::new(&file, air), RequirementSolver::of_checked(&file, air, 440.0));
         for (fingering, note) in file.fingerings.iter().zip(&solver.notes) {
             let (near_hz, _) = note.mode.as_ref().unwrap();
             for off in [0.93, 0.971, 1.0, 1.017] {

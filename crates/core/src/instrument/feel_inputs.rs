@@ -34,5 +34,9 @@ pub fn played_reed(file: &InstrumentFile, a4_hz: f64, settings: &Settings) -> Pl
 /// Allocates.
 pub fn requirements(model: &Model) -> RequirementSolver {
     let rows = |fingering: usize| model.tuning.notes.get(fingering).map_or(0.0, |note| note.natural);
-    RequirementSolver::new(&model.file, model.air, model.a4_hz).with_lattice(&model.file, &model.coeffs, rows)
+    RequirementSolver::of_checked(&model.file, model.air, model.a4_hz).with_lattice(
+        &model.file,
+        &model.coeffs,
+        rows,
+    )
 }
