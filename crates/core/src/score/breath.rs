@@ -19,6 +19,8 @@ const POINTS_MAX: usize = 3_600_000;
 
 /// Time between breath events while the curve moves, s.
 const STEP_S: f64 = 0.001;
+/// Longest ramp: a day, s.
+const LONGEST_S: f64 = 86_400.0;
 
 /// Why a breath curve was refused. Lines are counted from 1; the messages say what would be right.
 #[derive(Debug, thiserror::Error)]
@@ -107,6 +109,11 @@ pub struct BreathCurve {
     relative: bool,
 }
 
+/// The nearest gamma that a curve may have; 0 for NaN.
+fn clamped(gamma: f32) -> f32 {
+    if gamma.is_nan() { 0.0 } else { gamma.clamp(0.0, GAMMA_MAX) }
+}
+
 fn gamma(gamma: f32) -> Result<f32, BreathError> {
     if (0.0..=GAMMA_MAX).contains(&gamma) { Ok(gamma) } else { Err(BreathError::Gamma(gamma)) }
 }
@@ -127,14 +134,15 @@ pub fn closing_kpa(settings: &Settings) -> f32 {
 }
 
 impl BreathCurve {
-    /// The same gamma all the time, clamped to 0..=3.
+    /// The same gamma all the time, clamped to 0..=3; NaN counts as 0.
     pub fn constant(gamma: f32) -> Self {
-        Self { points: vec![(0.0, gamma.clamp(0.0, GAMMA_MAX))], relative: false }
+        Self { points: vec![(0.0, clamped(gamma))], relative: false }
     }
 
-    /// From 0 to `gamma` and back, `seconds` each way; gamma clamped to 0..=3, seconds positive.
+    /// From 0 to `gamma` and back, `seconds` each way; gamma clamped to 0..=3, seconds to a millisecond..=a day. NaN counts as the least.
     pub fn swell(gamma: f32, seconds: f64) -> Self {
-        let top = (seconds, gamma.clamp(0.0, GAMMA_MAX));
+        let seconds = if seconds.is_nan() { STEP_S } else { seconds.clamp(STEP_S, LONGEST_S) };
+        let top = (seconds, clamped(gamma));
         Self { points: vec![(0.0, 0.0), top, (2.0 * seconds, 0.0)], relative: false }
     }
 
@@ -183,7 +191,7 @@ impl BreathCurve {
             .trim_end_matches('s')
             .parse::<f64>()
             .ok()
-            .filter(|s| *s > 0.0 && *s <= 86_400.0)
+            .filter(|s| *s > 0.0 && *s <= LONGEST_S)
             .ok_or_else(|| BreathError::Seconds(duration.to_owned()))?;
         Ok(Self {
             points: vec![(0.0, gamma(number(from)?)?), (seconds, gamma(number(to)?)?)],
@@ -261,6 +269,7 @@ impl BreathCurve {
 
     /// Breath events for a score that lasts `samples`.
     pub(super) fn events(&self, samples: usize, rate: u32, settings: &Settings) -> Vec<Timed<Event>> {
+        let rate = rate.max(1);
         let unit = if self.relative { (samples as f64 / f64::from(rate)).max(STEP_S) } else { 1.0 };
         let mut events: Vec<Timed<Event>> = Vec::new();
         let mut last = None;
@@ -304,6 +313,18 @@ mod tests {
         }
         let one = BreathCurve::dynamics(0.6, 0.6, &settings);
         assert_eq!(one.events(48_000, 48_000, &settings).len(), 1);
+    }
+
+    #[test]
+    fn what_is_no_number_blows_nothing() {
+        assert_eq!(BreathCurve::constant(f32::NAN), BreathCurve::constant(0.0));
+        assert_eq!(BreathCurve::constant(f32::INFINITY).gamma_max(), GAMMA_MAX);
+        assert_eq!(BreathCurve::swell(f32::NAN, 1.0).gamma_max(), 0.0);
+        for seconds in [f64::NAN, 0.0, -1.0, f64::INFINITY, 1e300] {
+            let swell = BreathCurve::swell(0.5, seconds);
+            assert!(swell.points.windows(2).all(|pair| pair[0].0 < pair[1].0), "{swell:?}");
+            assert!((0..3).all(|t| (0.0..=0.5).contains(&swell.at(f64::from(t)))), "{swell:?}");
+        }
     }
 
     fn refusal(text: &str) -> String {

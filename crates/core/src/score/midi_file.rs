@@ -18,12 +18,10 @@ use crate::control::midi::MidiDecoder;
 use crate::control::notes::{NoteAddress, NoteExpression};
 use crate::control::parts::Parts;
 use crate::event::{Event, PartEvent, Timed};
+use crate::score::samples::SECONDS_MAX;
 use crate::score::timeline::Score;
 use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
 pub use tracks::{Tracks, read_tracks};
-
-/// Longest score, s. Sample positions stay far below the largest integer.
-const SECONDS_MAX: u32 = 6 * 3600;
 
 /// Microseconds in a quarter note until the file sets a tempo (Standard MIDI Files 1.0).
 const DEFAULT_TEMPO_US: u32 = 500_000;

@@ -3,7 +3,7 @@
 use crate::event::{Event, PartEvent, Played, Timed, To};
 use crate::instrument::Settings;
 use crate::score::breath::BreathCurve;
-use crate::score::samples::samples_in;
+use crate::score::samples::{length_s, samples_in};
 use crate::units::{SoundingNote, WrittenNote};
 
 /// Silence before a tongued note of a scale, s: the time a tongue takes to touch the reed and leave it again, chosen by ear.
@@ -56,9 +56,10 @@ impl From<&Score<PartEvent>> for Score {
 }
 
 impl Score {
-    /// One note from the start, held for `seconds`. `rate` is the sample rate, Hz.
+    /// One note from the start, held for `seconds`, 0 to six hours: what lies outside counts as the nearest, NaN as 0. `rate` is the
+    /// sample rate, Hz; 0 counts as 1.
     pub fn note(note: SoundingNote, seconds: f64, rate: u32) -> Self {
-        let end = samples_in(seconds, rate);
+        let end = samples_in(length_s(seconds), rate);
         let events = vec![
             Timed { at: 0, event: Event::NoteOn { note, velocity: PLAIN_VELOCITY } },
             Timed { at: end, event: Event::NoteOff { note } },
@@ -66,7 +67,8 @@ impl Score {
         Self { events, samples: end }
     }
 
-    /// Every semitone from one written note to another, up or down, each lasting `seconds`; tongued or slurred.
+    /// Every semitone from one written note to another, up or down, each lasting `seconds` as in [`note`](Self::note); tongued or
+    /// slurred.
     ///
     /// The instrument sounds `transposition` semitones below what is written (B flat clarinet: 2). `rate` is the sample rate,
     /// Hz.
@@ -100,6 +102,7 @@ impl Score {
         slurred: bool,
         rate: u32,
     ) -> Result<Self, ScoreError> {
+        let seconds = length_s(seconds);
         let gap_s = if slurred { 0.0 } else { TONGUE_GAP_S.min(seconds / 4.0) };
         let (mut events, mut end, mut last) = (Vec::new(), 0, None);
         for (index, &written) in notes.iter().enumerate() {
@@ -139,15 +142,15 @@ impl<E> Score<E> {
         Self { events, samples: self.samples }
     }
 
-    /// The same score with `seconds` more at its end, in which the sound fades.
+    /// The same score with `seconds` more at its end, at most six hours, in which the sound fades.
     pub fn with_tail(mut self, seconds: f64, rate: u32) -> Self {
-        self.samples = self.samples.saturating_add(samples_in(seconds, rate));
+        self.samples = self.samples.saturating_add(samples_in(length_s(seconds), rate));
         self
     }
 
-    /// Length of the score, s.
+    /// Length of the score, s. A rate of 0 counts as 1 Hz.
     pub fn seconds(&self, rate: u32) -> f64 {
-        self.samples as f64 / f64::from(rate)
+        self.samples as f64 / f64::from(rate.max(1))
     }
 }
 
@@ -186,6 +189,23 @@ mod tests {
             assert_eq!(scale.samples, 13 * 12_000);
             assert!(scale.events.is_sorted_by_key(|e| e.at));
         }
+    }
+
+    #[test]
+    fn no_score_is_endless() {
+        let six_hours = 6 * 3_600 * 48_000;
+        for (seconds, samples) in
+            [(0.5, 24_000), (-1.0, 0), (f64::NAN, 0), (1e300, six_hours), (f64::INFINITY, six_hours)]
+        {
+            assert_eq!(Score::note(SoundingNote(60), seconds, 48_000).samples, samples, "{seconds}");
+            assert_eq!(Score::<Event>::default().with_tail(seconds, 48_000).samples, samples, "{seconds}");
+            let scale = Score::scale(WrittenNote(60), WrittenNote(61), 2, seconds, false, 48_000).unwrap();
+            assert!(scale.samples == 2 * samples && scale.events.is_sorted_by_key(|e| e.at), "{seconds}");
+        }
+        let note = Score::note(SoundingNote(60), 2.0, 0);
+        assert_eq!((note.samples, note.seconds(0)), (2, 2.0));
+        let blown = note.with_tail(1.0, 1).blown(&BreathCurve::constant(0.5), &Settings::physical(), 0);
+        assert_eq!(blown.events.len(), 3);
     }
 
     #[test]
