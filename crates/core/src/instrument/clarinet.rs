@@ -13,6 +13,7 @@ use crate::dsp::resampler::Resampler;
 use crate::event::{Event, Timed};
 use crate::instrument::channels::Channels;
 use crate::instrument::choke::Choke;
+use crate::instrument::internal_rate::nearest_rate_hz;
 use crate::instrument::lip::embouchure;
 use crate::instrument::listening::Listening;
 use crate::instrument::model::{BuildError, Model};
@@ -114,7 +115,8 @@ impl Clarinet {
         Ok(Self::new(Arc::new(Model::built_in(host_rate_hz)?), host_rate_hz))
     }
 
-    /// Any instrument, from a model that was prepared for this host rate, Hz. Allocates.
+    /// Any instrument, from a model that was prepared for this host rate, Hz, 1000..=1536000. A rate outside counts as the nearest that is
+    /// inside, NaN as 48000: pitch and time are then others. Allocates.
     pub fn new(model: Arc<Model>, host_rate_hz: f64) -> Self {
         Self::of_player(model, host_rate_hz, 0)
     }
@@ -122,6 +124,7 @@ impl Clarinet {
     /// As [`new`](Self::new), played by one of several players, by number: with breath noise, wander and swing of its own,
     /// and out of tune by its share of [`Players::spread_cents`](super::Players::spread_cents). Number 0 is the lone player.
     pub fn of_player(model: Arc<Model>, host_rate_hz: f64, number: u8) -> Self {
+        let host_rate_hz = nearest_rate_hz(host_rate_hz);
         let resampler = Resampler::new(model.coeffs.rate_hz, host_rate_hz);
         Self::with_resampler(model, host_rate_hz, number, resampler)
     }

@@ -21,6 +21,7 @@ use crate::dsp::limiter::Limiter;
 use crate::event::{Event, PartEvent, SettingNumber, Timed, To};
 use crate::instrument::channels::Channels;
 use crate::instrument::clarinet::{Clarinet, Progress};
+use crate::instrument::internal_rate::nearest_rate_hz;
 use crate::instrument::listening::ListeningMode;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::person::Person;
@@ -208,9 +209,10 @@ impl Ensemble {
         Ok(Self::new(Arc::new(Model::built_in(host_rate_hz)?), host_rate_hz))
     }
 
-    /// Any instrument, from a model that was prepared for this host rate, Hz, with one player. Allocates the voices of all
-    /// players that there can be.
+    /// Any instrument, from a model that was prepared for this host rate, Hz, with one player; rates are taken as in
+    /// [`Clarinet::new`]. Allocates the voices of all players that there can be.
     pub fn new(model: Arc<Model>, host_rate_hz: f64) -> Self {
+        let host_rate_hz = nearest_rate_hz(host_rate_hz);
         let mut clarinets = vec![Clarinet::new(model, host_rate_hz)];
         for number in 1..MOST_PLAYERS as u8 {
             clarinets.push(clarinets[0].beside(host_rate_hz, number));

@@ -6,6 +6,11 @@ use crate::instrument::model::BuildError;
 /// carry high notes.
 pub const HOST_RATES_HZ: (f64, f64) = (1_000.0, 1_536_000.0);
 
+/// The host rate that is played where none can be: the nearest within [`HOST_RATES_HZ`], and 48 kHz for NaN. Hz.
+pub(super) fn nearest_rate_hz(host_rate_hz: f64) -> f64 {
+    if host_rate_hz.is_nan() { 48_000.0 } else { host_rate_hz.clamp(HOST_RATES_HZ.0, HOST_RATES_HZ.1) }
+}
+
 /// The lattice's rate for a host rate, both Hz: 88.2 kHz for the 44.1 kHz family, 96 kHz for all others.
 pub fn internal_rate_hz(host_rate_hz: f64) -> f64 {
     let family = |base: f64| {
