@@ -177,9 +177,17 @@ impl Resampler {
 
     /// More inputs, while whose clock glides to `speed` (0.25..=4, 1 is their rate). At most
     /// [`PUSH_MOST`](Self::PUSH_MOST), and only after [`pull`](Self::pull) came back short. Real-time safe.
+    ///
+    /// # Panics
+    /// With debug assertions, if there are more inputs, or if `pull` has not come back short. Without them, what is more is dropped.
     #[inline]
     pub fn push(&mut self, input: &[f32], speed: f64) {
-        debug_assert!(input.len() <= Self::PUSH_MOST && self.end > self.next);
+        debug_assert!(
+            input.len() <= Self::PUSH_MOST && self.end > self.next,
+            "push takes at most {} inputs, and only after pull came back short; got {}",
+            Self::PUSH_MOST,
+            input.len()
+        );
         let input = &input[..input.len().min(Self::PUSH_MOST)];
         if self.next + input.len() + BEYOND > self.history.len() {
             let gone = self.next - self.reach;
