@@ -25,7 +25,8 @@ pub fn at_once(base: &Model, file: &InstrumentFile) -> Result<Model, BuildError>
     Ok(with_cells(base, file, cells))
 }
 
-/// The altered instrument, fitted to its own transfer matrices. Takes seconds. Allocates.
+/// The altered instrument, fitted to its own transfer matrices. Takes seconds. The fit moves the whole bore a little, so notes whose holes
+/// stay as they were may move by up to 3 cents. Allocates.
 ///
 /// # Errors
 /// As [`at_once`], and [`BuildError::Cancelled`] if `on` ends it.
