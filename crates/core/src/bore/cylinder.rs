@@ -331,9 +331,6 @@ mod tests {
         let air = Air::default();
         let message = |cylinder: Cylinder| cylinder.build(air).unwrap_err().to_string();
         assert!(message(cylinder(&[])).contains("1 to 41"));
-        for a4_hz in [0.0, -1.0, f64::NAN, 1e9] {
-            assert!(message(Cylinder { a4_hz, ..cylinder(&[50]) }).contains("100 to 1000 Hz"));
-        }
         assert!(message(cylinder(&[52, 50])).contains("D3 comes after E3"));
         assert!(message(Cylinder { transposition: 36, ..cylinder(&[30]) }).contains("F#1"));
         assert!(message(cylinder(&[0])).contains("an octave of C-1"));
