@@ -1,6 +1,8 @@
 // The clarinet on its stage, drawn from the instrument file: true places and sizes along the bore. The body is drawn somewhat
 // thicker than it is, and the outer shape is plausible: the file knows the bore and the depth of the holes, but not the wood.
-// Finger holes are in front, with pads that stand open; closed keys are on the upper edge. As the editor draws it.
+// A short clarinet is drawn short; one that is longer than the usual ones is slender, and has neck and bell of metal. Finger holes
+// are in front, with pads that stand open, and plates where no finger tip covers the hole; closed keys are on the upper edge. As the
+// editor draws it.
 
 import { clamp } from './names.js';
 
@@ -8,6 +10,12 @@ import { clamp } from './names.js';
 const [WALL, RIM, BEAK] = [7e-3, 2.5e-3, 0.055];
 /** The body is at least this thick over its length, and over the height of the stage; most that its thickness is exaggerated. */
 const [LEAST_THICKNESS, LEAST_OF_HEIGHT, MOST_EXAGGERATED] = [0.056, 0.085, 2.2];
+/** Length of the usual clarinets, which fill the stage, and from which length on neck and bell are of metal, m. */
+const [USUAL, METAL] = [0.64, 0.9];
+/** On a stage narrower than this, pixels, a short one fills it, too. */
+const NARROW = 420;
+/** The widest hole that a finger tip covers, m of the radius. */
+const UNDER_FINGER = 6e-3;
 /** Most that the size of a hole is exaggerated: holes are neighbours along the bore. */
 const MOST_OF_HOLE = 1.7;
 /** How far a finger lifts, and the time in which it does, s: about that of a slur. */
@@ -19,8 +27,8 @@ const SLOWED_HZ = 1.5;
 /** Light over a cylinder from its upper edge to its lower edge: 1 is the colour itself. */
 const LIGHT = [[-1, 0.62], [-0.8, 0.98], [-0.5, 1.32], [-0.3, 1.16], [0, 0.96], [0.4, 0.76], [0.8, 0.56], [1, 0.46]];
 
-/** What the wave is, and the room that the name of the note takes beside it, pixels. */
-const [CAPTION, NOTE_WIDTH] = ['sound pressure in the bore', 90];
+/** What the wave is, the room that the name of the note takes beside it, and the stage that is too narrow for it, pixels. */
+const [CAPTION, NOTE_WIDTH, LEAST_CAPTIONED] = ['sound pressure in the bore', 90, 280];
 
 const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const lit = (colour, light) => colour.map((x) => Math.round(light > 1 ? x + (255 - x) * Math.min(1, light - 1) : x * light));
@@ -141,16 +149,18 @@ export class ClarinetDrawing {
     this.lastHole = Math.max(0, ...file.holes.map((hole) => hole.x));
     this.widest = Math.max(...file.bore.map(([, , , a, b]) => Math.max(a, b))) + RIM;
     const margin = clamp(0.03 * this.width, 14, 40);
-    this.left = margin;
-    this.scale = (this.width - 2 * margin) / file.length;
+    const share = this.width < NARROW ? 1 : Math.min(1, file.length / USUAL);
+    this.scale = (share * (this.width - 2 * margin)) / file.length;
+    this.left = (this.width - this.scale * file.length) / 2;
     const thin = (2 * (file.radius + this.wall)) / file.length;
-    const least = Math.max(LEAST_THICKNESS, (LEAST_OF_HEIGHT * this.height) / this.width);
+    const least = Math.max(LEAST_THICKNESS, (LEAST_OF_HEIGHT * this.height) / this.width) * Math.cbrt(Math.min(1, USUAL / file.length));
     const exaggerated = clamp(least / thin, 1, MOST_EXAGGERATED);
     this.across = Math.min(this.scale * exaggerated, (0.25 * this.height) / this.widest);
     this.axis = 0.64 * this.height;
     this.middle = this.outside(0.5 * file.length);
     this.thickness = 2 * this.across * (file.radius + this.wall);
     this.mouthpiece = this.mouthpieceEnd();
+    [this.neck, this.bell] = this.metal();
     this.drawBody(this.body.getContext('2d'));
     this.wake();
   }
@@ -178,6 +188,16 @@ export class ClarinetDrawing {
     const first = this.file.bore[0][0];
     const own = this.file.bore.findIndex(([part]) => part !== first);
     return Math.min(0.18, this.file.bore[Math.max(0, own - 1)][2]);
+  }
+
+  /** Where the neck of metal ends and the bell of metal begins, m. The neck is the part below the mouthpiece, unless it has holes. */
+  metal() {
+    const { bore, holes, length } = this.file;
+    if (length < METAL) return [this.mouthpiece, length];
+    const isFree = (from, to) => holes.every((hole) => hole.x < from || hole.x >= to);
+    const neck = bore.findLast(([part]) => part === bore.find(([, , to]) => to > this.mouthpiece + 1e-6)?.[0])?.[2] ?? this.mouthpiece;
+    const bell = bore.find(([part]) => part === bore.at(-1)[0])[1];
+    return [isFree(this.mouthpiece, neck) ? neck : this.mouthpiece, isFree(bell, length) ? bell : length];
   }
 
   /** A stretch of a round body, lit from above. */
@@ -209,9 +229,10 @@ export class ClarinetDrawing {
     g.restore();
     // The body, column by column.
     const ebonite = mix(c.ebony, c.wood, 0.35);
+    const colour = (metres) => (metres < this.mouthpiece ? ebonite : metres < this.neck || metres > this.bell ? c.metal : c.wood);
     for (let x = this.left; x < end; x += 1) {
       const metres = (x - this.left) / this.scale;
-      this.turned(g, x, Math.min(1.5, end - x), axis, this.outside(metres), metres < this.mouthpiece ? ebonite : c.wood);
+      this.turned(g, x, Math.min(1.5, end - x), axis, this.outside(metres), colour(metres));
     }
     // The bell's opening.
     const out = this.across * this.widest;
@@ -308,17 +329,17 @@ export class ClarinetDrawing {
 
   /** The sound pressure over the body, higher and lighter when it is loud. */
   drawWave(g) {
-    const foot = this.axis - this.middle - 22;
+    // Straight, so that only pressure bends the line: above the keys and above the bell.
+    const foot = this.axis - Math.max(this.middle + 22, this.across * this.widest + 4);
     const room = foot - 16;
     if (room < 20 || this.loudness <= 0) return;
     const height = room * (0.25 + 0.7 * this.loudness);
-    const place = (n) => (this.file.length * n) / 63;
-    const floor = (n) => foot - Math.max(0, this.outside(place(n)) - this.middle);
-    const y = (n) => Math.max(8, floor(n) - this.wave[n] * height);
+    const x = (n) => this.x((this.file.length * n) / 63);
     const line = new Path2D();
-    this.wave.forEach((_, n) => line[n ? 'lineTo' : 'moveTo'](this.x(place(n)), y(n)));
+    this.wave.forEach((share, n) => line[n ? 'lineTo' : 'moveTo'](x(n), foot - share * height));
     const area = new Path2D(line);
-    for (let n = 63; n >= 0; n -= 1) area.lineTo(this.x(place(n)), floor(n));
+    area.lineTo(x(63), foot);
+    area.lineTo(x(0), foot);
     const light = g.createLinearGradient(0, foot - height, 0, foot);
     light.addColorStop(0, css(this.c.breath, 0.42 * this.loudness));
     light.addColorStop(1, css(this.c.breath, 0.03));
@@ -329,8 +350,8 @@ export class ClarinetDrawing {
     g.lineJoin = 'round';
     g.stroke(line);
     g.font = '12px system-ui, sans-serif';
-    // Not under the name of the note.
-    if (room > 70 && this.left + 2 + g.measureText(CAPTION).width < this.width - NOTE_WIDTH) {
+    // Not under the name of the note, nor under the buttons, which are above on the narrowest phones.
+    if (room > 70 && this.width > LEAST_CAPTIONED && this.left + 2 + g.measureText(CAPTION).width < this.width - NOTE_WIDTH) {
       g.fillStyle = css(this.c.breath);
       g.fillText(CAPTION, this.left + 2, 14);
     }
@@ -384,7 +405,9 @@ export class ClarinetDrawing {
     this.ellipse(g, x, y, half + 3, half + 3, css(lit(c.metal, 0.85)));
     this.ellipse(g, x, y, half, half, css(air));
     this.ring(g, x, y, half, half, edge);
-    if (opening < 0.99) this.finger(g, x, y - LIFT * opening, half, 1 - 0.8 * opening);
+    const hasPlate = hole.r > UNDER_FINGER;
+    if (hasPlate) this.plate(g, x, y - LIFT * opening, half + 2, (half + 2) * (1 - 0.45 * opening), c.metal, edge);
+    if (opening < 0.99) this.finger(g, x, y - LIFT * opening, hasPlate ? 0.7 * half : half, 1 - 0.8 * opening);
   }
 
   /** A round plate seen from above, with a light towards its upper left. */

@@ -49,7 +49,7 @@ const data = await json('data.json').catch((error) => {
   throw error;
 });
 const drawing = new ClarinetDrawing(get('clarinet'));
-const meter = new Meter(data.dynamics);
+const meter = new Meter(data.dynamics, data.struck);
 const engine = new Engine(hear);
 const hands = new Hands((message) => engine.send(message));
 const keyboard = new Keyboard(get('keyboard'), hands, breathe);

@@ -2,19 +2,20 @@
 
 /** Part of the column below the threshold. */
 const BELOW = 0.07;
-/** Dynamic of a key that is struck with 0 and with 1, and mouth pressure over the closing pressure where breath is pressure, as in the sound. */
-const [STRUCK, STRUCK_GAMMA] = [[0.15, 1], [0.43, 0.85]];
 /** Mouth pressure at the top, over the closing pressure. */
 const TOP_GAMMA = 1.2;
 /** Least mouth pressure that is shown, kPa. */
 const LEAST_KPA = 0.02;
 
 export class Meter {
-  /** `dynamics` are names and places between pianissimo, 0, and fortissimo, 1. */
-  constructor(dynamics) {
+  /**
+   * `dynamics` are names and places between pianissimo, 0, and fortissimo, 1; `struck` are the `dynamic` of a key that is struck
+   * with 0 and with 1, and its `gamma` where breath is pressure: mouth pressure over the closing pressure.
+   */
+  constructor(dynamics, struck) {
     const get = (id) => document.getElementById(id);
     [this.air, this.marks, this.words, this.set] = ['air', 'dynamics', 'breathing', 'set'].map(get);
-    this.dynamics = dynamics;
+    [this.dynamics, this.struck] = [dynamics, struck];
     this.setPhysical(false);
   }
 
@@ -37,7 +38,7 @@ export class Meter {
   /** Marks how loud the next key will be that is struck with this velocity, 0..1. */
   mark(velocity) {
     this.velocity = velocity;
-    const [soft, loud] = this.isPhysical ? STRUCK_GAMMA.map((gamma) => gamma / TOP_GAMMA) : STRUCK.map((dynamic) => BELOW + (0.95 - BELOW) * dynamic);
+    const [soft, loud] = this.isPhysical ? this.struck.gamma.map((gamma) => gamma / TOP_GAMMA) : this.struck.dynamic.map((dynamic) => BELOW + (0.95 - BELOW) * dynamic);
     this.set.style.bottom = `${(100 * (soft + (loud - soft) * velocity)).toFixed(1)}%`;
     this.set.hidden = false;
   }

@@ -18,6 +18,7 @@ use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::player::dynamics::NAMED;
+use chalumeau_core::instrument::player::response::{VELOCITY_DYNAMIC, VELOCITY_GAMMA};
 use chalumeau_core::instrument::{Preparation, Settings, Wanted};
 use chalumeau_web::drawn::drawn;
 use chalumeau_web::playing::{ORIGINS, PICTURE_NAMES};
@@ -52,6 +53,8 @@ fn text() -> Result<String> {
     let controls = CONTROLS.into_iter().map(control).collect::<Result<Vec<_>>>()?;
     let all = json!({
         "dynamics": NAMED,
+        // Of a key that is struck with 0 and with 1.
+        "struck": { "dynamic": VELOCITY_DYNAMIC, "gamma": VELOCITY_GAMMA },
         "breathResponse": values::BREATH_RESPONSE,
         "defaults": values::list(&Settings::default()).to_vec(),
         "instruments": instruments,
@@ -180,6 +183,7 @@ mod tests {
         let presets = all["presets"].as_array().unwrap();
         assert!(presets.len() > 60 && presets.len() < factory::all().len(), "{}", presets.len());
         assert_eq!(presets[0]["values"], json!({}), "the first is the default");
+        assert_eq!(all["struck"]["dynamic"], json!(VELOCITY_DYNAMIC), "the meter marks how a key is struck");
         assert_eq!(all["controls"].as_array().unwrap().len(), CONTROLS.len());
     }
 

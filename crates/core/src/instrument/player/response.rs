@@ -22,9 +22,9 @@ use crate::reed::physical::P_REF_PA;
 pub const ONSET: f64 = (4.0_f32 / 127.0) as f64;
 /// Mouth pressure over the closing pressure for velocity 0 and 1 where the breath is physical: just above the threshold, and
 /// loud (by ear).
-const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
+pub const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
 /// Dynamic for velocity 0 and 1: soft and loud (by ear).
-const VELOCITY_DYNAMIC: (f64, f64) = (0.15, 1.0);
+pub const VELOCITY_DYNAMIC: (f64, f64) = (0.15, 1.0);
 /// Time constant with which the lip follows the dynamic, s: slower than the breath, as muscles are, but not heard as late.
 pub const LIP_S: f64 = 0.01;
 /// How much more slowly the tongue lets go at dynamic 0 than at 1, as a factor less 1: the release is then as loud as the note
