@@ -17,6 +17,7 @@ mod session;
 mod standalone_plugin;
 
 use std::process::ExitCode;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Parser;
@@ -46,6 +47,7 @@ pub fn main() -> ExitCode {
         has_window: !args.no_window && !lacks_display,
         quit: AtomicBool::new(false),
         window_failed: AtomicBool::new(false),
+        connections: Mutex::default(),
     }
     .set();
     quit::listen(options);
@@ -61,12 +63,14 @@ pub fn main() -> ExitCode {
     let tries = args.backends().into_iter();
     for (backend, inputs) in tries.flat_map(|one| args.inputs(one).iter().map(move |&inputs| (one, inputs))) {
         last_error.clear();
+        LaunchOptions::connect(|now| *now = args.connections(backend));
         // Held while the framework plays.
         let _keyboards = args.keyboards(backend).map(Keyboards::open);
         let words = match (backend == Backend::Jack).then(JackClient::open) {
             None => args.for_framework(backend, args.sample_rate, inputs),
             Some(Ok(client)) => {
                 let words = args.for_framework(Backend::Dummy, client.rate_hz(), 0);
+                LaunchOptions::connect(|now| now.sound = format!("JACK, {} Hz", client.rate_hz()));
                 JackLink::offer(client, args.jack_ports());
                 words
             }

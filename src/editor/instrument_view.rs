@@ -8,7 +8,7 @@ use crate::editor::clarinet_drawing::{ClarinetDrawing, ruler};
 use crate::editor::controls::{Hands, choice, heading, segments, slider, teach};
 use crate::editor::file_browser::{FileBrowser, FileKind};
 use crate::editor::note_names::{NoteNames, note_name};
-use crate::editor::snapshot::Snapshot;
+use crate::editor::snapshot::{Connections, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 use chalumeau_core::instrument::KeyPitches;
@@ -259,4 +259,20 @@ fn column(
     heading(ui, "Output");
     slider(ui, hands, "gain");
     choice(ui, hands, "qual");
+    if let Some(connections) = &snapshot.connections {
+        show_connections(ui, connections);
+    }
+}
+
+/// Where sound and MIDI go and come from, in a program without a host.
+fn show_connections(ui: &mut Ui, connections: &Connections) {
+    let c = Colours::here(ui);
+    heading(ui, concat!("Chalumeau ", env!("CARGO_PKG_VERSION")));
+    let mut line = |name: &str, value: &str| {
+        ui.label(RichText::new(name).color(c.quiet));
+        ui.label(value);
+    };
+    line("Sound output", &connections.sound);
+    line("MIDI inputs", &connections.midi_line());
+    ui.label(RichText::new(&connections.how).font(theme::small()).color(c.quiet));
 }

@@ -32,7 +32,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, is_wide: bool, is_blind: bool) {
     let c = Colours::here(ui);
     let narrow = usize::from(!is_wide);
     if !is_blind {
-        meter(ui, snapshot.output_peak, METER[narrow], is_wide);
+        meter(ui, snapshot, METER[narrow], is_wide);
     }
     let source = snapshot.sources.iter().find(|source| source.is_live);
     let source = source.map_or("keys", |source| source.input.title());
@@ -42,13 +42,15 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, is_wide: bool, is_blind: bool) {
     lamp(ui, LAMP[narrow], word("Breath"), blows.then_some(c.breath), ["Breath blows", "No breath"], &about);
     let about =
         "Lit while notes or controllers arrive from the host or a MIDI input. Keys of this window are none.";
+    let inputs = snapshot.connections.as_ref().map(|now| format!(" MIDI inputs: {}.", now.midi_line()));
+    let about = format!("{about}{}", inputs.unwrap_or_default());
     lamp(
         ui,
         LAMP[narrow],
         word("MIDI"),
         snapshot.hears_midi.then_some(c.speaks),
         ["MIDI arrives", "No MIDI"],
-        about,
+        &about,
     );
 }
 
@@ -72,14 +74,14 @@ fn lamp(ui: &mut Ui, width: f32, word: &str, light: Option<Color32>, said: [&str
     response.on_hover_text(about);
 }
 
-fn meter(ui: &mut Ui, peak: f32, width: f32, has_word: bool) {
+fn meter(ui: &mut Ui, snapshot: &Snapshot, width: f32, has_word: bool) {
     let c = Colours::here(ui);
     let word = if has_word { METER_WORD } else { 0.0 };
     let (rect, response) = ui.allocate_exact_size(vec2(word + width, 16.0), Sense::hover());
     if has_word {
         ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, "Output", theme::small(), c.quiet);
     }
-    let db = 20.0 * peak.max(1e-6).log10();
+    let db = 20.0 * snapshot.output_peak.max(1e-6).log10();
     let now_s = ui.input(|input| input.time);
     let held = ui.data_mut(|data| {
         let held = data.get_temp_mut_or_insert_with(response.id, || Held { db: FLOOR_DB, at_s: now_s });
@@ -99,6 +101,7 @@ fn meter(ui: &mut Ui, peak: f32, width: f32, has_word: bool) {
     }
     let said = if db <= FLOOR_DB { format!("Output: {NO_SOUND}") } else { format!("Output {db:.0} dB") };
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
-    response
-        .on_hover_text(format!("{said}. The output of both channels, {FLOOR_DB:.0} to 0 dB of full scale"));
+    let goes = snapshot.connections.as_ref().map(|now| format!(". Sound goes to: {}", now.sound));
+    let about = format!("{said}. The output of both channels, {FLOOR_DB:.0} to 0 dB of full scale");
+    response.on_hover_text(about + &goes.unwrap_or_default());
 }

@@ -107,6 +107,29 @@ pub struct Snapshot {
     pub latency_ms: f32,
     /// The largest window that the screen has room for, points at 100 %; `None` if that is not known.
     pub room: Option<(f32, f32)>,
+    /// Where sound and MIDI go and come from, in a program without a host.
+    pub connections: Option<Connections>,
+}
+
+/// Where sound and MIDI go and come from, in a program without a host.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Connections {
+    /// The sound output.
+    pub sound: String,
+    /// The MIDI inputs that play.
+    pub midi: Vec<String>,
+    /// How the user chooses others.
+    pub how: String,
+}
+
+impl Connections {
+    /// The MIDI inputs on one line.
+    pub fn midi_line(&self) -> String {
+        match self.midi.is_empty() {
+            true => "none; a keyboard plays as soon as you plug it in".to_owned(),
+            false => self.midi.join(", "),
+        }
+    }
 }
 
 impl Default for Snapshot {
@@ -154,6 +177,7 @@ impl Default for Snapshot {
             knob: KnobState::default(),
             latency_ms: 0.0,
             room: None,
+            connections: None,
         }
     }
 }

@@ -3,8 +3,10 @@
 //! The framework constructs the plugin by itself and passes nothing to it. These options are therefore the one global of
 //! the plugin. The standalone sets them once, before it starts the framework. In a host nobody sets them.
 
-use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use crate::editor::snapshot::Connections;
 
 use super::params::instrument::InstrumentChoice;
 
@@ -25,6 +27,8 @@ pub struct LaunchOptions {
     pub quit: AtomicBool,
     /// The plugin sets this when its window could not open.
     pub window_failed: AtomicBool,
+    /// Where sound and MIDI go and come from, for the window.
+    pub connections: Mutex<Connections>,
 }
 
 impl LaunchOptions {
@@ -36,6 +40,18 @@ impl LaunchOptions {
     /// Whether they change what a new instance plays.
     pub fn has_changes(&self) -> bool {
         self.instrument.is_some() || self.a4_hz.is_some()
+    }
+
+    /// Tells the window of a change of the connections.
+    pub fn connect(change: impl FnOnce(&mut Connections)) {
+        if let Some(options) = Self::get() {
+            change(&mut options.connections.lock().unwrap_or_else(PoisonError::into_inner));
+        }
+    }
+
+    /// Where sound and MIDI go and come from; `None` in a host.
+    pub fn connections() -> Option<Connections> {
+        Self::get().map(|options| options.connections.lock().unwrap_or_else(PoisonError::into_inner).clone())
     }
 
     /// The options of this process; `None` in a host.

@@ -3,6 +3,7 @@
 use clap::{Parser, ValueEnum};
 
 use super::jack::JackPorts;
+use crate::editor::snapshot::Connections;
 use crate::plugin::InstrumentChoice;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -213,6 +214,36 @@ impl Args {
         let is_listed = self.midi_input.as_deref() == Some("");
         let has_own = matches!(backend, Backend::Jack | Backend::Dummy);
         (!is_listed && !has_own).then(|| self.midi_input.clone())
+    }
+
+    /// Where sound goes with this backend, and how to choose another place, for the window. MIDI inputs come later.
+    pub fn connections(&self, backend: Backend) -> Connections {
+        let (sound, how) = match backend {
+            Backend::Dummy => ("none", "To hear it, start the program without --backend dummy."),
+            Backend::Auto | Backend::Jack => (
+                "JACK",
+                "A patchbay for JACK connects other outputs and MIDI devices. For a sound card without JACK, start the program with \
+                 --output-device \"NAME\".",
+            ),
+            #[allow(unreachable_patterns)]
+            _ => (
+                self.output_device.as_deref().unwrap_or("the system's output"),
+                "For another, start the program with --output-device \"NAME\" or --midi-input \"NAME\"; an empty name lists them.",
+            ),
+        };
+        let sound = match backend {
+            Backend::Dummy | Backend::Auto | Backend::Jack => sound.to_owned(),
+            #[allow(unreachable_patterns)]
+            _ => {
+                format!(
+                    "{sound} ({}), {} Hz, blocks of {}",
+                    backend.name(),
+                    self.sample_rate,
+                    self.period_size
+                )
+            }
+        };
+        Connections { sound, midi: Vec::new(), how: how.to_owned() }
     }
 
     /// The JACK ports to connect to.

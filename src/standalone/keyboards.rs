@@ -17,6 +17,8 @@ use nice_plug::context::process::SendEventError;
 use nice_plug::prelude::*;
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use crate::plugin::launch_options::LaunchOptions;
+
 /// What our own ports are called.
 const CLIENT: &str = "Chalumeau keyboards";
 /// In the name of the system's port that sends back what it gets.
@@ -145,6 +147,8 @@ impl State {
                 _ => {}
             }
         }
+        let names = self.open.iter().map(|keyboard| keyboard.name.clone()).collect();
+        LaunchOptions::connect(|now| now.midi = names);
     }
 
     fn is_wanted(&self, name: &str) -> bool {

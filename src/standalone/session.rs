@@ -171,6 +171,7 @@ mod tests {
             has_window: true,
             quit: Default::default(),
             window_failed: Default::default(),
+            connections: Default::default(),
         };
         let (_, params) = start(&path, Some(&options));
         assert_eq!(params.embouchure.strength.value(), 3.5);

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use chalumeau::controllers::breath_input::BreathInput;
 use chalumeau::editor::controls::Controls;
 use chalumeau::editor::note_names::NoteNames;
+use chalumeau::editor::snapshot::Connections;
 use chalumeau::editor::{Action, FeelTest, Tab};
 use chalumeau_core::units::SoundingNote;
 use egui::accesskit::Role;
@@ -588,6 +589,24 @@ fn control_and_0_bring_the_size_back_in_a_window_without_a_host() {
         window.harness.run();
         assert_eq!(window.harness.state().kept.zoom, zoom);
     }
+}
+
+#[test]
+fn a_program_without_a_host_says_where_its_sound_and_midi_are() {
+    let mut window = Window::tall(Tab::Instrument);
+    assert!(window.harness.query_by_label("Sound output").is_none(), "a host has its own windows for it");
+    window.snapshot.borrow_mut().connections = Some(Connections {
+        sound: "JACK, 48000 Hz: system:playback_1".to_owned(),
+        midi: Vec::new(),
+        how: "A patchbay connects others.".to_owned(),
+    });
+    window.harness.run();
+    window.harness.get_by_label("JACK, 48000 Hz: system:playback_1");
+    window.harness.get_by_label("none; a keyboard plays as soon as you plug it in");
+    window.harness.get_by_label("A patchbay connects others.");
+    window.snapshot.borrow_mut().connections.as_mut().unwrap().midi = vec!["KeyStep".to_owned()];
+    window.harness.run();
+    window.harness.get_by_label("KeyStep");
 }
 
 #[test]

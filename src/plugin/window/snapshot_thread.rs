@@ -27,6 +27,7 @@ use crate::plugin::breath_sources::BreathSources;
 use crate::plugin::instrument_loading::{CurrentInstrument, Readiness};
 #[cfg(feature = "devices")]
 use crate::plugin::knob;
+use crate::plugin::launch_options::LaunchOptions;
 use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
@@ -147,6 +148,7 @@ impl SnapshotThread {
         self.show_knob(&mut snapshot);
         let is_looking = matches!(snapshot.fingerings, FingeringSearch::Looking(_));
         snapshot.status = self.status(current.as_ref(), &inside);
+        snapshot.connections = LaunchOptions::connections();
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();
         let is_moving = is_looking

@@ -12,7 +12,8 @@ use crate::standalone::keyboards::plays_unasked;
 
 /// The client's name, unless another program has it.
 const NAME: &str = "chalumeau";
-const OUTPUTS: [&str; 2] = ["output_1", "output_2"];
+/// The ports of the sound.
+pub const OUTPUTS: [&str; 2] = ["output_1", "output_2"];
 /// The port of a microphone.
 pub const MICROPHONE: &str = "microphone";
 /// The port whose MIDI plays the plugin.

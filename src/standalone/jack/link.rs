@@ -10,8 +10,11 @@ use std::time::{Duration, Instant};
 use nice_plug::context::PluginApi;
 use nice_plug::prelude::*;
 
-use super::client::{Connection, Health, JackClient, MICROPHONE, MIDI_INPUT, MIDI_OUTPUT, PlayingClient};
+use super::client::{
+    Connection, Health, JackClient, MICROPHONE, MIDI_INPUT, MIDI_OUTPUT, OUTPUTS, PlayingClient,
+};
 use crate::plugin::Chalumeau;
+use crate::plugin::launch_options::LaunchOptions;
 
 /// How often the link looks at the server.
 const POLL: Duration = Duration::from_millis(50);
@@ -242,6 +245,7 @@ impl LinkThread {
                 if !std::mem::replace(&mut self.stalls, true) {
                     self.forget();
                     self.say(STALLED);
+                    LaunchOptions::connect(|now| now.sound = STALLED.to_owned());
                 }
             }
             Health::IsOver => {
@@ -250,6 +254,7 @@ impl LinkThread {
                 // Those of the next server are new.
                 self.keyboards.as_mut().map(HashSet::clear);
                 self.say(GONE);
+                LaunchOptions::connect(|now| (now.sound, now.midi) = (GONE.to_owned(), Vec::new()));
                 self.keep_connections();
                 return None;
             }
@@ -269,12 +274,28 @@ impl LinkThread {
         self.connect(client);
         self.noted.swap(0, 1);
         self.noted[1] = client.connections();
+        self.tell_window();
     }
 
     /// Makes the connections of a new client.
     fn connect_first(&mut self, client: &PlayingClient) {
         self.connect(client);
         self.noted = [client.connections(), client.connections()];
+        self.tell_window();
+    }
+
+    /// Tells the window what the ports are connected to.
+    fn tell_window(&self) {
+        let others = |own: &[&str]| -> Vec<String> {
+            let wanted = self.noted[1].iter().filter(|connection| own.contains(&connection.own));
+            wanted.map(|connection| connection.other.clone()).collect()
+        };
+        let (outputs, midi) = (others(&OUTPUTS), others(&[MIDI_INPUT]));
+        let rate_hz = self.shared.rate_hz();
+        LaunchOptions::connect(|now| {
+            let outputs = if outputs.is_empty() { "not connected".to_owned() } else { outputs.join(", ") };
+            (now.sound, now.midi) = (format!("JACK, {rate_hz} Hz: {outputs}"), midi);
+        });
     }
 
     /// Makes the connections whose ports are there. They are wanted again even if the server ends before the next look.
