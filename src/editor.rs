@@ -332,6 +332,18 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     {
         kept.zoom = 1.0;
     }
+    // In a plugin, the keys of the computer are the host's.
+    if keyboard.has_letters() && !is_blind && hands.entry.is_none() && !ui.ctx().text_edit_focused() {
+        use egui::{Key, Modifiers};
+        let redo = Modifiers::COMMAND | Modifiers::SHIFT;
+        let pressed = |modifiers, key| ui.input_mut(|input| input.consume_key(modifiers, key));
+        // Ctrl+Z would take Ctrl+Shift+Z, too.
+        if pressed(redo, Key::Z) || pressed(Modifiers::COMMAND, Key::Y) {
+            header::redo_step(&mut hands, snapshot, &mut actions);
+        } else if pressed(Modifiers::COMMAND, Key::Z) {
+            header::undo_step(&mut hands, snapshot, &mut actions);
+        }
+    }
     let is_listed = snapshot.knob.devices.iter().any(|device| device.is_knob);
     let has_knob = snapshot.knob.is_live || is_listed || hands.step("knob") > 0;
 
@@ -388,6 +400,9 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             }
         }
     });
+    if let Some(moved) = clarinet.alterations().take_move() {
+        hands.history.record_move(moved);
+    }
     // A widget that disappears while it is held, with its view or in a blind comparison, cannot end its gesture.
     if !hands.held.is_empty() && !ui.input(|input| input.pointer.any_down() || input.pointer.any_released()) {
         hands.let_go();

@@ -139,6 +139,7 @@ impl AbComparison {
                 changes: resting.changes_to(&now),
                 preset: Some([resting.preset.clone(), now.preset.clone()]),
                 copied_from: Some(self.side),
+                ..Step::default()
             });
         }
         self.resting = Some(now);
@@ -201,6 +202,7 @@ impl AbComparison {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chalumeau_core::bore::alterations::Alterations;
 
     fn with_lip(value: f32, preset: &str) -> SideSetting {
         SideSetting { values: vec![("lip", value)], preset: preset.to_owned() }
@@ -226,12 +228,12 @@ mod tests {
         };
         step(&mut history, 0.1, 0.2);
         compare.go(ComparisonSide::B, with_lip(0.2, ""), &mut history);
-        assert!(history.undoable().is_none(), "B has no step yet");
+        assert!(history.undoable("").is_none(), "B has no step yet");
         step(&mut history, 0.2, 0.9);
         compare.go(ComparisonSide::A, with_lip(0.9, ""), &mut history);
-        assert_eq!(history.undo().values, [("lip", 0.1)]);
+        assert_eq!(history.undo("", &Alterations::default()).values, [("lip", 0.1)]);
         compare.go(ComparisonSide::B, with_lip(0.1, ""), &mut history);
-        assert_eq!(history.undo().values, [("lip", 0.2)]);
+        assert_eq!(history.undo("", &Alterations::default()).values, [("lip", 0.2)]);
     }
 
     #[test]

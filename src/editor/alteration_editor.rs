@@ -10,13 +10,12 @@ use crate::editor::hole_names::hole_title;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
+use crate::editor::undo::Move;
 use chalumeau_core::bore::alterations::Alterations;
 use chalumeau_core::bore::instrument_file::{InstrumentFile, ToneHole};
 use chalumeau_core::bore::moved_hole::MovedHole;
 use chalumeau_core::bore::pulled_joint::PulledJoint;
 
-/// Steps that can be undone.
-const KEPT: usize = 100;
 /// Width of the line below which units lose their words, points.
 const NARROW: f32 = 640.0;
 /// Height of a row of buttons over a picture, points.
@@ -41,9 +40,11 @@ pub struct AlterationEditor {
     chosen: Option<Altered>,
     /// The alterations as a drag found them.
     held: Option<Arc<Alterations>>,
-    /// The alterations before each change, and the key of the instrument they belong to.
-    undo: Vec<Arc<Alterations>>,
-    of: String,
+    /// Number of the gesture, and the alterations before it.
+    gesture: u64,
+    before: Arc<Alterations>,
+    /// What the user has asked for in this frame.
+    asked: Option<Move>,
 }
 
 impl AlterationEditor {
@@ -80,7 +81,7 @@ impl AlterationEditor {
         actions: &mut Vec<Action>,
     ) {
         if response.drag_started() {
-            self.remember(snapshot);
+            self.begin(snapshot);
             (self.is_open, self.held) = (true, Some(snapshot.alterations.clone()));
             self.chosen = Some(it.clone());
         }
@@ -108,21 +109,33 @@ impl AlterationEditor {
                 with_joint(built, held, PulledJoint { part, by_m })
             }
         };
-        ask(wanted, snapshot, actions);
+        self.ask(wanted, snapshot, actions);
     }
 
-    fn remember(&mut self, snapshot: &Snapshot) {
-        if self.of != snapshot.instrument_key {
-            self.undo.clear();
-            self.of.clone_from(&snapshot.instrument_key);
-        }
-        if self.undo.len() == KEPT {
-            self.undo.remove(0);
-        }
-        self.undo.push(snapshot.alterations.clone());
+    /// A gesture begins.
+    fn begin(&mut self, snapshot: &Snapshot) {
+        self.gesture += 1;
+        self.before = snapshot.alterations.clone();
     }
 
-    /// What is chosen in numbers, and the way back.
+    fn ask(&mut self, wanted: Alterations, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        if wanted != *snapshot.alterations {
+            self.asked = Some(Move {
+                gesture: self.gesture,
+                instrument_key: snapshot.instrument_key.clone(),
+                before: self.before.clone(),
+                after: Arc::new(wanted.clone()),
+            });
+            actions.push(Action::Alter(wanted));
+        }
+    }
+
+    /// What the user has asked for in this frame, for the steps that can be undone.
+    pub fn take_move(&mut self) -> Option<Move> {
+        self.asked.take()
+    }
+
+    /// What is chosen in numbers, and what to do with it.
     pub fn line(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
         ui.horizontal(|ui| {
@@ -141,7 +154,7 @@ impl AlterationEditor {
                 if ui.button("Done").clicked() {
                     self.is_open = false;
                 }
-                self.files_and_undo(ui, snapshot, actions);
+                self.save_and_put_back(ui, snapshot, actions);
             });
         });
     }
@@ -168,17 +181,8 @@ impl AlterationEditor {
         });
     }
 
-    /// Whether something is altered, or a change can be undone.
-    pub fn has_changes(&self, snapshot: &Snapshot) -> bool {
-        !snapshot.alterations.is_empty() || self.can_undo(snapshot)
-    }
-
-    fn can_undo(&self, snapshot: &Snapshot) -> bool {
-        self.of == snapshot.instrument_key && !self.undo.is_empty()
-    }
-
-    /// Buttons that save what is altered, put it back, and undo the last change, from the right.
-    pub fn files_and_undo(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    /// Buttons that save what is altered and put it back, from the right.
+    pub fn save_and_put_back(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let is_altered = !snapshot.alterations.is_empty();
         let about = "Saves the instrument as it is now. A saved instrument can be opened in the Instrument view and is \
              tuned as a whole.";
@@ -191,14 +195,8 @@ impl AlterationEditor {
         }
         let back = ui.add_enabled(is_altered, egui::Button::new("Put back"));
         if back.on_hover_text("All holes and joints go back to where they were").clicked() {
-            self.remember(snapshot);
-            actions.push(Action::Alter(Alterations::default()));
-        }
-        let undo = ui.add_enabled(self.can_undo(snapshot), egui::Button::new("Undo move"));
-        if undo.on_hover_text("Undo the last move of a hole or a joint").clicked()
-            && let Some(before) = self.undo.pop()
-        {
-            actions.push(Action::Alter(Arc::unwrap_or_clone(before)));
+            self.begin(snapshot);
+            self.ask(Alterations::default(), snapshot, actions);
         }
     }
 
@@ -232,7 +230,7 @@ impl AlterationEditor {
             }
         }
         if now != here {
-            ask(with_hole(file, alterations, now), snapshot, actions);
+            self.ask(with_hole(file, alterations, now), snapshot, actions);
         }
         true
     }
@@ -253,7 +251,7 @@ impl AlterationEditor {
         let about =
             format!("From {:.1} to {:.1} mm; all below the ring moves with it", 1e3 * least_m, 1e3 * most_m);
         if self.number(ui, &mut mm, "mm longer", &label, &about, snapshot) {
-            ask(with_joint(file, alterations, PulledJoint { part, by_m: 1e-3 * mm }), snapshot, actions);
+            self.ask(with_joint(file, alterations, PulledJoint { part, by_m: 1e-3 * mm }), snapshot, actions);
         }
         true
     }
@@ -274,7 +272,7 @@ impl AlterationEditor {
         let response = ui.add(value).on_hover_text(about);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, label));
         if response.drag_started() || response.gained_focus() {
-            self.remember(snapshot);
+            self.begin(snapshot);
         }
         let unit = if is_narrow { "mm" } else { unit };
         ui.label(RichText::new(unit).font(theme::small()).color(c.quiet));
@@ -331,10 +329,4 @@ fn with_joint(built: &InstrumentFile, alterations: &Alterations, joint: PulledJo
         }
     }
     all
-}
-
-fn ask(wanted: Alterations, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-    if wanted != *snapshot.alterations {
-        actions.push(Action::Alter(wanted));
-    }
 }

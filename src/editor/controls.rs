@@ -210,7 +210,7 @@ impl Hands<'_> {
             .map(|&(id, after)| self.controls.look(id).map(|look| Change { id, before: look.value, after }));
         let changes: Vec<Change> = looks.flatten().collect();
         self.restore(&values);
-        self.history.record(Step { changes, preset: Some(preset), copied_from: None });
+        self.history.record(Step { changes, preset: Some(preset), ..Step::default() });
     }
 
     /// Sets values that are no new step: undo, redo, A/B.

@@ -53,7 +53,7 @@ pub fn tools(
             |ui, (hands, actions)| {
                 // Undo would tell what was set, and on which side.
                 if !is_blind {
-                    undo(ui, hands, actions);
+                    undo(ui, hands, snapshot, actions);
                 }
                 ui.add_space(4.0);
                 sides(ui, compare, hands, snapshot, actions, is_wide);
@@ -209,35 +209,54 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
     response.on_hover_text(about);
 }
 
-fn undo(ui: &mut Ui, hands: &mut Hands, actions: &mut Vec<Action>) {
-    let name = |hands: &Hands, step: Option<&Step>| {
-        step.map(|Step { changes, preset, copied_from }| match (copied_from, preset) {
-            (Some(side), _) => format!("the copy of {}", side.name()),
-            (None, Some([_, chosen])) => format!("the choice of {chosen}"),
-            (None, None) => changes.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", "),
-        })
-    };
-    let mut restore = |hands: &mut Hands, Restored { values, preset }: Restored| {
-        hands.restore(&values);
-        actions.extend(preset.map(Action::ChosePreset));
-    };
-    let (undoable, redoable) = (name(hands, hands.history.undoable()), name(hands, hands.history.redoable()));
-    ui.add_enabled_ui(undoable.is_some(), |ui| {
-        let response = icon(ui, Icon::Undo, "Undo");
-        let response = response.on_hover_text(format!("Undo {}", undoable.clone().unwrap_or_default()));
-        if response.clicked() {
-            let restored = hands.history.undo();
-            restore(hands, restored);
+/// Takes the last step back.
+pub fn undo_step(hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    let restored = hands.history.undo(&snapshot.instrument_key, &snapshot.alterations);
+    restore(restored, hands, actions);
+}
+
+/// Does the last step that was taken back again.
+pub fn redo_step(hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    let restored = hands.history.redo(&snapshot.instrument_key, &snapshot.alterations);
+    restore(restored, hands, actions);
+}
+
+fn restore(restored: Restored, hands: &mut Hands, actions: &mut Vec<Action>) {
+    hands.restore(&restored.values);
+    actions.extend(restored.preset.map(Action::ChosePreset));
+    actions.extend(restored.alterations.map(Action::Alter));
+}
+
+/// What a step did, for the tip of the arrows.
+fn step_name(hands: &Hands, step: &Step) -> String {
+    match step {
+        Step { moved: Some(moved), .. } => format!("the alteration of {}", moved.titles().join(", ")),
+        Step { copied_from: Some(side), .. } => format!("the copy of {}", side.name()),
+        Step { preset: Some([_, chosen]), .. } => format!("the choice of {chosen}"),
+        Step { changes, .. } => {
+            changes.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", ")
         }
-    });
-    ui.add_enabled_ui(redoable.is_some(), |ui| {
-        let response = icon(ui, Icon::Redo, "Redo");
-        let response = response.on_hover_text(format!("Redo {}", redoable.clone().unwrap_or_default()));
-        if response.clicked() {
-            let restored = hands.history.redo();
-            restore(hands, restored);
-        }
-    });
+    }
+}
+
+fn undo(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    let key = &snapshot.instrument_key;
+    let name = |step: Option<&Step>| step.map(|step| step_name(hands, step));
+    let steps = [name(hands.history.undoable(key)), name(hands.history.redoable(key))];
+    let arrows = [(Icon::Undo, "Undo"), (Icon::Redo, "Redo")];
+    for ((symbol, word), step) in arrows.into_iter().zip(steps) {
+        ui.add_enabled_ui(step.is_some(), |ui| {
+            let response = icon(ui, symbol, word);
+            let response = response
+                .on_hover_text(format!("{word} {}", step.unwrap_or_default()))
+                .on_disabled_hover_text(format!("{word}: settings, presets, moved holes and joints"));
+            match symbol {
+                _ if !response.clicked() => {}
+                Icon::Redo => redo_step(hands, snapshot, actions),
+                _ => undo_step(hands, snapshot, actions),
+            }
+        });
+    }
 }
 
 fn sides(

@@ -96,14 +96,14 @@ impl PlayView {
             if let Some(hole) = clicked {
                 trial.toggle(hole, snapshot, actions);
             }
-            if alterations.has_changes(snapshot) {
+            if !snapshot.alterations.is_empty() {
                 let place = Rect::from_min_max(
                     rect.min + vec2(200.0, 8.0),
                     pos2(rect.right() - 12.0, rect.top() + 8.0 + alteration_editor::ROW),
                 );
                 let layout = egui::Layout::right_to_left(egui::Align::Center);
                 ui.scope_builder(egui::UiBuilder::new().max_rect(place).layout(layout), |ui| {
-                    alterations.files_and_undo(ui, snapshot, actions);
+                    alterations.save_and_put_back(ui, snapshot, actions);
                 });
                 let below = place.translate(vec2(0.0, alteration_editor::ROW + 4.0));
                 AlterationEditor::saved(ui, below, snapshot, actions);

@@ -1,9 +1,17 @@
 //! Undo and redo of the changes made in this window.
-//! A step is a gesture: the parameters it changed, each with its value before and after. Changes by the host or by another
-//! controller are not recorded. Undoing sets a parameter to the value that it had at the start of the gesture. A and B have a
-//! history each: undoing on one side leaves the other alone.
+//! A step is a gesture: the parameters it changed, each with its value before and after, or the holes and joints it moved.
+//! Changes by the host or by another controller are not recorded. Undoing sets a parameter to the value that it had at the
+//! start of the gesture. A and B have a history each: undoing on one side leaves the parameters of the other alone. Holes and
+//! joints belong to their instrument on both sides; a step takes back only what it moved itself, and waits while another
+//! instrument plays.
+
+use std::sync::Arc;
 
 use crate::editor::ab_comparison::ComparisonSide;
+use crate::editor::hole_names::hole_title;
+use chalumeau_core::bore::alterations::Alterations;
+use chalumeau_core::bore::moved_hole::MovedHole;
+use chalumeau_core::bore::pulled_joint::PulledJoint;
 
 /// Steps kept; some hours of work.
 const KEPT: usize = 200;
@@ -19,6 +27,63 @@ pub struct Change {
     pub after: f32,
 }
 
+/// Holes and joints that a step moved.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Move {
+    /// Number of the gesture: what one gesture asks for in turn is one step.
+    pub gesture: u64,
+    /// What names the instrument in a saved project.
+    pub instrument_key: String,
+    /// All alterations before the gesture.
+    pub before: Arc<Alterations>,
+    /// All alterations after it.
+    pub after: Arc<Alterations>,
+}
+
+impl Move {
+    /// What it moved, as musicians write it.
+    pub fn titles(&self) -> Vec<String> {
+        let is_hole = |name: &str| hole(&self.before, name).or(hole(&self.after, name)).is_some();
+        let title = |name: &str| if is_hole(name) { hole_title(name) } else { name.to_owned() };
+        self.names().into_iter().map(title).collect()
+    }
+
+    /// Names of the holes and parts that it moved.
+    fn names(&self) -> Vec<&str> {
+        let mut names = self.before.names();
+        names.extend(self.after.names());
+        let mut moved = Vec::new();
+        for name in names {
+            let is_same = hole(&self.before, name) == hole(&self.after, name)
+                && joint(&self.before, name) == joint(&self.after, name);
+            if !is_same && !moved.contains(&name) {
+                moved.push(name);
+            }
+        }
+        moved
+    }
+
+    /// `now` with what this move changed as it is in `to`, one of its two ends.
+    fn brought(&self, now: &Alterations, to: &Alterations) -> Alterations {
+        let mut all = now.clone();
+        for name in self.names() {
+            all.holes.retain(|hole| hole.name != name);
+            all.holes.extend(hole(to, name).cloned());
+            all.joints.retain(|joint| joint.part != name);
+            all.joints.extend(joint(to, name).cloned());
+        }
+        all
+    }
+}
+
+fn hole<'a>(of: &'a Alterations, name: &str) -> Option<&'a MovedHole> {
+    of.holes.iter().find(|hole| hole.name == name)
+}
+
+fn joint<'a>(of: &'a Alterations, part: &str) -> Option<&'a PulledJoint> {
+    of.joints.iter().find(|joint| joint.part == part)
+}
+
 /// A step: what it changed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
@@ -28,6 +93,15 @@ pub struct Step {
     pub preset: Option<[String; 2]>,
     /// The side whose setting it has copied, if it has.
     pub copied_from: Option<ComparisonSide>,
+    /// Holes and joints that it moved, if it moved any.
+    pub moved: Option<Move>,
+}
+
+impl Step {
+    /// Whether it can be undone and redone while this instrument plays.
+    fn is_of(&self, instrument_key: &str) -> bool {
+        self.moved.as_ref().is_none_or(|moved| moved.instrument_key == instrument_key)
+    }
 }
 
 /// What undo or redo brings back.
@@ -37,6 +111,8 @@ pub struct Restored {
     pub values: Vec<(&'static str, f32)>,
     /// Name of the preset, if the step chose one.
     pub preset: Option<String>,
+    /// All alterations of the instrument, if the step moved a hole or a joint.
+    pub alterations: Option<Alterations>,
 }
 
 /// The steps that can be undone, and those that can be redone.
@@ -81,38 +157,67 @@ impl UndoHistory {
             return;
         }
         self.undone.clear();
+        self.push(step);
+    }
+
+    /// Holes or joints moved. What the same gesture moved before belongs to the same step.
+    pub fn record_move(&mut self, moved: Move) {
+        let last = self.done.last_mut().and_then(|step| step.moved.as_mut());
+        match last.filter(|last| last.gesture == moved.gesture) {
+            Some(last) => last.after = moved.after,
+            None => {
+                self.undone.clear();
+                self.push(Step { moved: Some(moved), ..Step::default() });
+            }
+        }
+        // Back where it was, it is no step.
+        let is_nothing = |step: &Step| step.moved.as_ref().is_some_and(|moved| moved.before == moved.after);
+        if self.done.last().is_some_and(is_nothing) {
+            self.done.pop();
+        }
+    }
+
+    fn push(&mut self, step: Step) {
         self.done.push(step);
         if self.done.len() > KEPT {
             self.done.remove(0);
         }
     }
 
-    /// What undoing would touch.
-    pub fn undoable(&self) -> Option<&Step> {
-        self.done.last()
+    /// What undoing would touch while this instrument plays.
+    pub fn undoable(&self, instrument_key: &str) -> Option<&Step> {
+        self.done.iter().rev().find(|step| step.is_of(instrument_key))
     }
 
-    /// What redoing would touch.
-    pub fn redoable(&self) -> Option<&Step> {
-        self.undone.last()
+    /// What redoing would touch while this instrument plays.
+    pub fn redoable(&self, instrument_key: &str) -> Option<&Step> {
+        self.undone.iter().rev().find(|step| step.is_of(instrument_key))
     }
 
-    /// Takes the last step back.
-    pub fn undo(&mut self) -> Restored {
-        let Some(step) = self.done.pop() else { return Restored::default() };
+    /// Takes the last step back. `now`: the alterations of the instrument that plays.
+    pub fn undo(&mut self, instrument_key: &str, now: &Alterations) -> Restored {
+        let Some(at) = self.done.iter().rposition(|step| step.is_of(instrument_key)) else {
+            return Restored::default();
+        };
+        let step = self.done.remove(at);
         let values = step.changes.iter().rev().map(|change| (change.id, change.before)).collect();
         let preset = step.preset.as_ref().map(|[before, _]| before.clone());
+        let alterations = step.moved.as_ref().map(|moved| moved.brought(now, &moved.before));
         self.undone.push(step);
-        Restored { values, preset }
+        Restored { values, preset, alterations }
     }
 
-    /// Does the last undone step again.
-    pub fn redo(&mut self) -> Restored {
-        let Some(step) = self.undone.pop() else { return Restored::default() };
+    /// Does the last undone step again. `now`: see [`undo`](Self::undo).
+    pub fn redo(&mut self, instrument_key: &str, now: &Alterations) -> Restored {
+        let Some(at) = self.undone.iter().rposition(|step| step.is_of(instrument_key)) else {
+            return Restored::default();
+        };
+        let step = self.undone.remove(at);
         let values = step.changes.iter().map(|change| (change.id, change.after)).collect();
         let preset = step.preset.as_ref().map(|[_, after]| after.clone());
+        let alterations = step.moved.as_ref().map(|moved| moved.brought(now, &moved.after));
         self.done.push(step);
-        Restored { values, preset }
+        Restored { values, preset, alterations }
     }
 }
 
@@ -120,15 +225,26 @@ impl UndoHistory {
 mod tests {
     use super::*;
 
+    /// The values that undoing and redoing bring back, and the step that would be undone.
+    impl UndoHistory {
+        fn back(&mut self) -> Restored {
+            self.undo("", &Alterations::default())
+        }
+
+        fn again(&mut self) -> Restored {
+            self.redo("", &Alterations::default())
+        }
+    }
+
     #[test]
     fn a_gesture_is_one_step_however_far_it_went() {
         let mut history = UndoHistory::default();
         history.begin("zeta", 0.1);
         history.begin("zeta", 0.2);
         history.end("zeta", 0.7);
-        assert_eq!(history.undo().values, [("zeta", 0.1)]);
-        assert_eq!(history.undo().values, []);
-        assert_eq!(history.redo().values, [("zeta", 0.7)]);
+        assert_eq!(history.back().values, [("zeta", 0.1)]);
+        assert_eq!(history.back().values, []);
+        assert_eq!(history.again().values, [("zeta", 0.7)]);
     }
 
     #[test]
@@ -137,9 +253,9 @@ mod tests {
         history.begin("reedh", 0.1);
         history.begin("reedk", 0.2);
         history.end("reedh", 0.3);
-        assert!(history.undoable().is_none());
+        assert!(history.undoable("").is_none());
         history.end("reedk", 0.4);
-        assert_eq!(history.undo().values, [("reedk", 0.2), ("reedh", 0.1)]);
+        assert_eq!(history.back().values, [("reedk", 0.2), ("reedh", 0.1)]);
     }
 
     #[test]
@@ -147,9 +263,9 @@ mod tests {
         let mut history = UndoHistory::default();
         let changes = vec![Change { id: "lip", before: 0.1, after: 0.2 }];
         let preset = Some(["Old".to_owned(), "New".to_owned()]);
-        history.record(Step { changes, preset, copied_from: None });
-        assert_eq!(history.undo().preset.as_deref(), Some("Old"));
-        assert_eq!(history.redo().preset.as_deref(), Some("New"));
+        history.record(Step { changes, preset, ..Step::default() });
+        assert_eq!(history.back().preset.as_deref(), Some("Old"));
+        assert_eq!(history.again().preset.as_deref(), Some("New"));
     }
 
     #[test]
@@ -159,13 +275,13 @@ mod tests {
             history.begin("lip", 0.1);
             history.end("lip", after);
         }
-        history.undo();
+        history.back();
         history.begin("lip", 0.5);
         history.end("lip", 0.5);
-        assert!(history.redoable().is_some(), "a click that moved nothing");
+        assert!(history.redoable("").is_some(), "a click that moved nothing");
         history.begin("lip", 0.5);
         history.end("lip", 0.6);
-        assert!(history.redoable().is_none());
+        assert!(history.redoable("").is_none());
     }
 
     #[test]
@@ -176,6 +292,52 @@ mod tests {
             history.end("lip", n as f32 + 1.0);
         }
         assert_eq!(history.done.len(), KEPT);
-        assert_eq!(history.undo().values, [("lip", 999.0)]);
+        assert_eq!(history.back().values, [("lip", 999.0)]);
+    }
+
+    fn moved(gesture: u64, holes: [&[(&str, f64)]; 2]) -> Move {
+        let all = |holes: &[(&str, f64)]| {
+            let hole = |&(name, x_m): &(&str, f64)| MovedHole { name: name.to_owned(), x_m, radius_m: 4e-3 };
+            Arc::new(Alterations { holes: holes.iter().map(hole).collect(), joints: Vec::new() })
+        };
+        let [before, after] = holes.map(all);
+        Move { gesture, instrument_key: "b-flat".to_owned(), before, after }
+    }
+
+    #[test]
+    fn a_hole_that_is_dragged_is_one_step_among_the_others() {
+        let mut history = UndoHistory::default();
+        history.begin("lip", 0.1);
+        history.end("lip", 0.2);
+        history.record_move(moved(1, [&[], &[("R2", 0.31)]]));
+        history.record_move(moved(1, [&[], &[("R2", 0.32)]]));
+        let now = moved(0, [&[], &[("R2", 0.32)]]).after;
+        assert_eq!(history.undoable("b-flat").and_then(|step| step.moved.as_ref()).unwrap().names(), ["R2"]);
+        assert_eq!(history.undo("b-flat", &now).alterations, Some(Alterations::default()));
+        assert_eq!(history.redo("b-flat", &Alterations::default()).alterations.as_ref(), Some(&*now));
+        history.undo("b-flat", &now);
+        let restored = history.undo("b-flat", &Alterations::default());
+        assert_eq!((restored.values, restored.alterations), (vec![("lip", 0.1)], None));
+    }
+
+    #[test]
+    fn a_hole_that_is_dragged_back_is_no_step() {
+        let mut history = UndoHistory::default();
+        history.record_move(moved(1, [&[], &[("R2", 0.31)]]));
+        history.record_move(moved(1, [&[], &[]]));
+        assert!(history.undoable("b-flat").is_none());
+    }
+
+    /// On the other side of a comparison R3 was moved meanwhile; it stays.
+    #[test]
+    fn a_move_takes_back_itself_alone_and_on_its_instrument_alone() {
+        let mut history = UndoHistory::default();
+        history.begin("lip", 0.1);
+        history.end("lip", 0.2);
+        history.record_move(moved(1, [&[("L1", 0.2)], &[("L1", 0.2), ("R2", 0.31)]]));
+        let now = moved(0, [&[], &[("L1", 0.2), ("R2", 0.31), ("R3", 0.36)]]).after;
+        assert!(history.undoable("bass").is_some_and(|step| step.moved.is_none()));
+        let wanted = moved(0, [&[], &[("L1", 0.2), ("R3", 0.36)]]).after;
+        assert_eq!(history.undo("b-flat", &now).alterations.as_ref(), Some(&*wanted));
     }
 }

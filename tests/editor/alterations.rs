@@ -4,7 +4,7 @@ use chalumeau::editor::{Action, Tab};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::moved_hole::MovedHole;
 use egui::{Key, Modifiers, vec2};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 
 use crate::Window;
 
@@ -51,15 +51,15 @@ fn a_hole_is_dragged_undone_and_put_back() {
     assert_eq!(wider.x_m, first.x_m);
     assert!((wider.radius_m - first.radius_m - 1e-3).abs() < 1e-5, "{wider:?}");
 
-    click(&mut window, "Undo move");
+    click(&mut window, "Undo");
     assert_eq!(moved(&window), std::slice::from_ref(first));
-    click(&mut window, "Undo move");
+    click(&mut window, "Undo");
     assert!(moved(&window).is_empty());
     drag(&mut window, vec2(8.0, 0.0), Modifiers::NONE);
     click(&mut window, "Put back");
     assert!(moved(&window).is_empty());
     // Putting back can be undone too.
-    click(&mut window, "Undo move");
+    click(&mut window, "Undo");
     assert_eq!(moved(&window).len(), 1);
     click(&mut window, "Done");
     window.harness.get_by_label("1 alteration");
@@ -76,9 +76,39 @@ fn a_hole_of_the_play_view_is_dragged_and_undone() {
     assert_eq!((first.name.as_str(), first.radius_m), ("R2", built().radius_m));
     assert!(first.x_m < built().x_m);
     assert!(window.actions().iter().all(|action| matches!(action, Action::Alter(_))), "no trial");
-    click(&mut window, "Undo move");
+    click(&mut window, "Undo");
     assert!(moved(&window).is_empty());
-    assert!(window.harness.query_by_label("Undo move").is_none(), "nothing is left to undo");
+    assert!(window.harness.get_by_label("Undo").accesskit_node().is_disabled(), "nothing is left to undo");
+    assert!(window.harness.query_by_label("Put back").is_none(), "nothing is altered");
+    click(&mut window, "Redo");
+    assert_eq!(moved(&window), std::slice::from_ref(first));
+}
+
+/// One row of steps: a control, a hole, and a joint come back in turn, whichever view is shown.
+#[test]
+fn undo_takes_back_controls_and_moves_in_turn() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    let lip = window.harness.get_by_label("Lip").rect().center();
+    window.drag(lip, vec2(0.0, -20.0));
+    let hole = window.harness.get_by_label_contains("Hole R2, ").rect().center();
+    window.drag(hole, vec2(-12.0, 0.0));
+    window.drag(lip, vec2(0.0, -20.0));
+    let (first, second) = (moved(&window), window.host.value("lip"));
+    click(&mut window, "Undo");
+    assert!(window.host.value("lip") < second && moved(&window) == first);
+    click(&mut window, "Sound");
+    window.harness.get_by_label("Undo").hover();
+    window.harness.run_steps(60);
+    window.harness.get_by_label("Undo the alteration of R2");
+    click(&mut window, "Undo");
+    assert!(moved(&window).is_empty());
+    click(&mut window, "Undo");
+    assert_eq!(window.host.plain("lip"), 1.0);
+    assert!(window.harness.get_by_label("Undo").accesskit_node().is_disabled());
+    for _ in 0..3 {
+        click(&mut window, "Redo");
+    }
+    assert_eq!((window.host.value("lip"), moved(&window)), (second, first));
 }
 
 #[test]
@@ -147,7 +177,7 @@ fn a_hole_is_given_in_millimetres_and_saved() {
     // Of another instrument nothing can be undone here, though it has the same name.
     window.snapshot.borrow_mut().instrument_key = "user:/home/music/other.toml".to_owned();
     window.harness.run();
-    click(&mut window, "Undo move");
+    click(&mut window, "Undo");
     assert!(window.actions().is_empty());
 }
 
@@ -187,7 +217,7 @@ fn a_joint_is_pulled_by_its_ring() {
     drag(&mut window, vec2(-12.0, 0.0), Modifiers::NONE);
     assert!((built().x_m - moved(&window)[0].x_m - 12.0 / points_a_metre).abs() < 4e-4);
     window.harness.get_by_label("Place of the hole R2, mm from the reed");
-    click(&mut window, "Undo move");
+    click(&mut window, "Undo");
     assert!(moved(&window).is_empty() && !pulled(&window).is_empty());
     window.actions();
     click(&mut window, "Save");

@@ -10,7 +10,7 @@ use chalumeau::editor::snapshot::Connections;
 use chalumeau::editor::{Action, FeelTest, Tab};
 use chalumeau_core::units::SoundingNote;
 use egui::accesskit::Role;
-use egui::{Key, vec2};
+use egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 
 use crate::Window;
@@ -607,6 +607,27 @@ fn a_program_without_a_host_says_where_its_sound_and_midi_are() {
     window.snapshot.borrow_mut().connections.as_mut().unwrap().midi = vec!["KeyStep".to_owned()];
     window.harness.run();
     window.harness.get_by_label("KeyStep");
+}
+
+#[test]
+fn control_and_z_undo_in_a_window_without_a_host() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    let lip = window.harness.get_by_label("Lip").rect().center();
+    window.drag(lip, vec2(0.0, -20.0));
+    let moved = window.host.value("lip");
+    let press = |window: &mut Window, modifiers| {
+        window.harness.key_press_modifiers(modifiers, Key::Z);
+        window.harness.run();
+    };
+    press(&mut window, Modifiers::COMMAND);
+    assert_eq!(window.host.value("lip"), moved, "in a host, the keys are the host's");
+    let state = std::mem::take(window.harness.state_mut());
+    *window.harness.state_mut() = state.with_letters();
+    press(&mut window, Modifiers::COMMAND);
+    assert_eq!(window.host.plain("lip"), 1.0);
+    press(&mut window, Modifiers::COMMAND | Modifiers::SHIFT);
+    assert_eq!(window.host.value("lip"), moved);
+    assert!(window.actions().iter().all(|action| !matches!(action, Action::NoteOn { .. })), "no note");
 }
 
 #[test]
