@@ -326,6 +326,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     }
     breath.look(&snapshot.sources, ui.input(|input| input.time));
     trial.keep_to(snapshot, &mut actions);
+    clarinet.name_trial(kept.names, snapshot, trial);
     // A window that has grown past the screen hides the list of sizes.
     if keyboard.has_letters()
         && ui.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Num0))

@@ -24,7 +24,10 @@ pub fn draw(
         ui.label(RichText::new("Blind comparison").font(FontId::proportional(22.0)));
         let told = if compare.is_revealed() {
             let [x, y] = [true, false].map(|first| compare.behind(first).name());
-            format!("X was {x}, Y was {y}. Done ends the comparison.")
+            let heard = compare.side.name();
+            format!(
+                "X was {x}, Y was {y}. Done ends the comparison and goes on with {heard}, which you hear."
+            )
         } else {
             "Play, switch between X and Y as often as you like, decide, then press Reveal.".to_owned()
         };
@@ -65,14 +68,15 @@ pub fn draw(
         });
         ui.add_space(0.05 * height);
         if compare.is_revealed() {
-            if ui.button("Done").clicked() {
+            if ui.add(main_button("Done")).clicked() {
                 compare.end_blind();
             }
             return;
         }
-        if ui.button("Reveal").clicked() {
+        if ui.add(main_button("Reveal")).clicked() {
             compare.reveal();
         }
+        ui.add_space(2.0);
         // The side that plays would be told by the letter at the top.
         let about = "Ends the comparison on A, without telling which side was which";
         if ui.button("Cancel").on_hover_text(about).clicked() {
@@ -80,4 +84,9 @@ pub fn draw(
             compare.switch(ComparisonSide::A, hands, &snapshot.preset, actions);
         }
     });
+}
+
+/// The button that leads on.
+fn main_button(text: &str) -> egui::Button<'_> {
+    egui::Button::new(RichText::new(text).font(theme::heading())).min_size(vec2(120.0, 32.0))
 }

@@ -33,6 +33,9 @@ use fingering_panel::{Chosen, FingeringPanel};
 /// Least distance of two buttons with their names below, points.
 const NAMED: f32 = 38.0;
 
+/// Name of a fingering that is not in the chart.
+const OWN: &str = "your own fingering";
+
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct ClarinetView {
@@ -46,6 +49,15 @@ impl ClarinetView {
     /// How the user alters the bore, in every view.
     pub fn alterations(&mut self) -> &mut AlterationEditor {
         &mut self.alterations
+    }
+
+    /// Names the fingering of a trial, in every view.
+    pub fn name_trial(&mut self, names: NoteNames, snapshot: &Snapshot, trial: &mut Trial) {
+        let Some(tried) = trial.open() else { return };
+        let all = self.choices(&snapshot.instrument);
+        let choice = all.iter().find(|choice| choice.open == tried);
+        let name = choice.map(|choice| choice_name(choice, names, snapshot.instrument.transposition));
+        trial.set_name(name.unwrap_or_else(|| OWN.to_owned()));
     }
 
     /// Draws the view.
@@ -191,13 +203,7 @@ impl ClarinetView {
                 .fingering()
                 .and_then(|fingering| all.iter().position(|choice| choice.open == fingering.open)),
         };
-        let name = |choice: &FingeringChoice| {
-            let note = names.of_written(choice.written, snapshot.instrument.transposition);
-            if choice.register == multiphonic_choices::REGISTER {
-                return format!("M{}", choice.nth + 1);
-            }
-            format!("{}{}", note.map_or_else(String::new, note_name), "'".repeat(choice.nth))
-        };
+        let name = |choice: &FingeringChoice| choice_name(choice, names, snapshot.instrument.transposition);
         if self.alterations.is_open() {
             self.alterations.line(ui, snapshot, actions);
         } else {
@@ -216,7 +222,7 @@ impl ClarinetView {
                     };
                     format!("{} {}{more}: {fingers}", name(choice), choice.register)
                 }
-                None => "your own fingering".into(),
+                None => OWN.to_owned(),
             };
             self.fingering_line(ui, told, snapshot, trial, actions);
         }
@@ -317,6 +323,15 @@ impl ClarinetView {
             }
         }
     }
+}
+
+/// Name of a fingering: that of its note with a prime for each fingering before it, or the number of a multiphonic.
+fn choice_name(choice: &FingeringChoice, names: NoteNames, transposition: i8) -> String {
+    if choice.register == multiphonic_choices::REGISTER {
+        return format!("M{}", choice.nth + 1);
+    }
+    let note = names.of_written(choice.written, transposition);
+    format!("{}{}", note.map_or_else(String::new, note_name), "'".repeat(choice.nth))
 }
 
 /// Place of the wave above the body.

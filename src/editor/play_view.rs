@@ -21,6 +21,7 @@ use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP};
 use crate::editor::trial::Trial;
+use crate::editor::widgets::one_line;
 use macro_knob::Macro;
 use motion::Motion;
 
@@ -109,22 +110,42 @@ impl PlayView {
                 AlterationEditor::saved(ui, below, snapshot, actions);
             }
             if trial.is_on() {
-                let place = Rect::from_center_size(rect.center_bottom() - vec2(0.0, 21.0), vec2(180.0, 26.0));
-                let back = ui.put(place, egui::Button::new("Back to the note"));
-                if back.on_hover_text("Ends the trial; the played note sets the holes again").clicked() {
-                    trial.end(actions);
-                }
-                if snapshot.sounding.is_none() {
-                    let at = place.right_center() + vec2(12.0, 0.0);
-                    let text = "Fingering held: play a key to hear it";
-                    ui.painter().text(at, egui::Align2::LEFT_CENTER, text, theme::body(), c.ink);
-                }
+                let row = Rect::from_center_size(
+                    rect.center_bottom() - vec2(0.0, 21.0),
+                    vec2(rect.width() - 16.0, 26.0),
+                );
+                back_to_the_note(ui, row, snapshot, trial, actions);
             } else if snapshot.sounding.is_none() {
                 let at = rect.center_bottom() - vec2(0.0, 10.0);
                 let text = "Play a key below, or blow. Click a hole to try it, drag it to move it.";
                 ui.painter().text(at, egui::Align2::CENTER_BOTTOM, text, theme::body(), c.ink);
             }
         });
+    }
+}
+
+/// Says what is tried, and offers the way back, in the middle of a row.
+fn back_to_the_note(
+    ui: &mut Ui,
+    row: Rect,
+    snapshot: &Snapshot,
+    trial: &mut Trial,
+    actions: &mut Vec<Action>,
+) {
+    const BUTTON: f32 = 150.0;
+    let c = Colours::here(ui);
+    let hint = if snapshot.sounding.is_none() { ": play a key to hear it" } else { "" };
+    let told = format!("Trying {}{hint}", trial.name());
+    let words = one_line(ui, &told, theme::body(), c.ink, row.width() - BUTTON - 12.0);
+    let left = row.center().x - 0.5 * (words.size().x + 12.0 + BUTTON);
+    let place = Rect::from_min_size(pos2(left, row.center().y - 0.5 * words.size().y), words.size());
+    let label = ui.interact(place, ui.scope_id().with("tried"), egui::Sense::hover());
+    label.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &told));
+    ui.painter().galley(place.min, words, c.ink);
+    let button = Rect::from_min_size(pos2(place.right() + 12.0, row.top()), vec2(BUTTON, row.height()));
+    let back = ui.put(button, egui::Button::new("Back to the note"));
+    if back.on_hover_text("Ends the trial; the played note sets the holes again").clicked() {
+        trial.end(actions);
     }
 }
 

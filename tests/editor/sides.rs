@@ -69,7 +69,10 @@ fn a_and_b_keep_their_settings_and_blind_hides_them() {
     let side_of_x =
         if window.harness.query_by_label_contains("X was A, Y was B.").is_some() { "A" } else { "B" };
     let side_of_y = if side_of_x == "A" { "B" } else { "A" };
-    let told = format!("X was {side_of_x}, Y was {side_of_y}. Done ends the comparison.");
+    // Y was chosen last.
+    let told = format!(
+        "X was {side_of_x}, Y was {side_of_y}. Done ends the comparison and goes on with {side_of_y}, which you hear."
+    );
     window.harness.get_by_label(&told);
     assert!(!tells(&window, "Reveal"));
     click(&mut window, "Done");

@@ -300,6 +300,7 @@ fn holes_are_tried_and_given_back() {
     assert_eq!(window.actions(), [Action::TryFingering(g4.clone())]);
     // The trial is the same in every view.
     click(&mut window, "Play");
+    window.harness.get_by_label("Trying G4");
     click(&mut window, "Back to the note");
     assert_eq!(window.actions(), [Action::EndTry]);
     click(&mut window, "Clarinet");
