@@ -361,7 +361,8 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
                 files.close();
             }
         });
-    let keys = (0.13 * height).clamp(52.0, 110.0);
+    // White keys stay longer than wide, and no longer than on an instrument.
+    let keys = (0.13 * height).clamp(52.0, 110.0f32.max(0.11 * width));
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
     let is_text = hands.entry.is_some() || ui.ctx().text_edit_focused();
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, kept.names, snapshot, is_text, &mut actions));

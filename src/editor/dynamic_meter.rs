@@ -8,10 +8,12 @@ use egui::{
 use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::snapshot::{NO_BREATH_KPA, Snapshot};
-use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::instrument::BreathResponse;
 use chalumeau_core::instrument::player::dynamics::NAMED;
+
+/// Widest place beside a view in a window of the usual size, points.
+const USUAL_WIDTH: f32 = 112.0;
 
 /// Part of the column below the threshold.
 const BELOW: f32 = 0.07;
@@ -43,10 +45,13 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
         (BreathResponse::Physical, _) => physical(snapshot, c),
     };
     let painter = ui.painter();
-    let width = if rect.width() > 96.0 { 34.0 } else { 26.0 };
+    // A wide place is one in a large window.
+    let grown = (rect.width() / USUAL_WIDTH).max(1.0);
+    let width = if rect.width() > 96.0 { 34.0 * grown } else { 26.0 };
+    let small = FontId::proportional(12.0 * grown);
     let column = Rect::from_min_max(
         pos2(rect.left() + 12.0, rect.top() + 12.0),
-        pos2(rect.left() + 12.0 + width, rect.bottom() - 34.0),
+        pos2(rect.left() + 12.0 + width, rect.bottom() - 34.0 * grown),
     );
     let y = |level: f32| column.bottom() - level.clamp(0.0, 1.0) * column.height();
     let round = CornerRadius::same((0.5 * width) as u8);
@@ -74,7 +79,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
     }
     let mut lowest = f32::INFINITY;
     for mark in &reading.marks {
-        let text_y = y(mark.at).min(lowest - 15.0);
+        let text_y = y(mark.at).min(lowest - 15.0 * grown);
         lowest = text_y;
         let reach = if mark.is_dynamic { 4.0 } else { 7.0 };
         let from = if mark.is_dynamic { column.right() } else { column.left() - 4.0 };
@@ -86,7 +91,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
             (true, false) => c.quiet,
             (false, _) => mark.colour,
         };
-        let font = if mark.is_dynamic { FontId::proportional(15.0) } else { theme::small() };
+        let font = if mark.is_dynamic { FontId::proportional(15.0 * grown) } else { small.clone() };
         let at = pos2(column.right() + reach + 4.0, text_y);
         if mark.is_dynamic {
             let job = italics(mark.name, font, ink);
@@ -99,7 +104,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
     let source =
         snapshot.sources.iter().find(|source| source.is_live).map_or("Breath", |source| source.input.title());
     let at = pos2(rect.left() + 10.0, rect.bottom() - 4.0);
-    let name = painter.layout(source.to_owned(), theme::small(), c.quiet, rect.width() - 10.0);
+    let name = painter.layout(source.to_owned(), small, c.quiet, rect.width() - 10.0);
     painter.galley(at - vec2(0.0, name.size().y), name, c.quiet);
     let kpa = snapshot.mouth_now_kpa();
     let told = format!("Mouth pressure {kpa:.2} kPa, {}, from {source}", reading.word);

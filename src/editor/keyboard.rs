@@ -7,8 +7,8 @@ mod switch_row;
 mod typed_letters;
 
 use egui::{
-    Align2, Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo,
-    pos2, vec2,
+    Align2, Color32, CornerRadius, Event, EventFilter, FontId, Key, Pos2, Rect, Role, Sense, Stroke, Ui,
+    WidgetInfo, pos2, vec2,
 };
 
 use crate::editor::Action;
@@ -25,6 +25,11 @@ const PLAIN: f32 = 0.75;
 
 /// Least height at which a key shows both its letter and its name, points. On a lower one the letter has the place of the name.
 const ROOM_FOR_BOTH: f32 = 80.0;
+
+/// White keys up to this width have words of the usual size, points; on wider ones they grow.
+const USUAL_WHITE: f32 = 42.0;
+/// Most that they grow.
+const MOST_GROWN: f32 = 1.8;
 
 /// Width of the sign left of the keys that tells how to play them, points.
 const HELP_MARK: f32 = 14.0;
@@ -292,6 +297,8 @@ impl Keys {
             }
         }
         let is_low = self.rect.height() < ROOM_FOR_BOTH;
+        let grown = (self.white / USUAL_WHITE).clamp(1.0, MOST_GROWN);
+        let font = FontId::proportional(12.0 * grown);
         let letter = |note: u8| letter(note).filter(|_| named(note).is_some());
         for note in self.from..=self.to {
             let (key, is_down) = (self.key(note), down.contains(&Some(note)));
@@ -301,12 +308,12 @@ impl Keys {
                 (_, true) => c.ivory,
                 (_, false) => ON_IVORY,
             };
-            let words = painter.layout_no_wrap(letter.to_owned(), theme::small(), ink);
+            let words = painter.layout_no_wrap(letter.to_owned(), font.clone(), ink);
             // Clear of the names below, and on a white key of the black ones above.
             let low = match is_black(note) && !is_down {
                 true => 4.0,
                 false if is_low => 3.0,
-                false => 18.0,
+                false => 18.0 * grown,
             };
             let place = pos2(key.center().x - 0.5 * words.size().x, key.bottom() - low - words.size().y);
             painter.galley(place, words, ink);
@@ -321,7 +328,7 @@ impl Keys {
             };
             let Some(name) = name else { continue };
             let ink = if is_down { c.on_accent } else { ON_IVORY };
-            let words = painter.layout_no_wrap(note_name(name), theme::small(), ink);
+            let words = painter.layout_no_wrap(note_name(name), font.clone(), ink);
             let left = (key.center().x - 0.5 * words.size().x)
                 .clamp(self.rect.left(), self.rect.right() - words.size().x);
             let place = Rect::from_min_size(pos2(left, key.bottom() - 3.0 - words.size().y), words.size());

@@ -4,6 +4,7 @@
 //! light in the holes that sound comes out of. On its left stands the breath in a musician's words, below it the main controls
 //! and the last ten seconds. A click on a hole opens or closes it for a trial and a drag moves it, as in the clarinet view.
 
+mod instrument_title;
 mod lit_body;
 mod macro_knob;
 mod motion;
@@ -42,6 +43,11 @@ const MACROS: [Macro; 11] = [
 /// Width of a main control, with its words, points.
 const MACRO_WIDTH: f32 = 92.0;
 
+/// A view of this size has all its words and controls as they are designed, points: what is left of a window of the usual size.
+const USUAL: (f32, f32) = (1_084.0, 516.0);
+/// Most that they grow in a larger one.
+const MOST_GROWN: f32 = 2.5;
+
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct PlayView {
@@ -63,44 +69,47 @@ impl PlayView {
         self.motion.follow(ui, snapshot, trial.open());
         let height = ui.available_height();
         let is_small = height < 420.0;
+        let grown = (ui.available_width() / USUAL.0).min(height / USUAL.1).clamp(1.0, MOST_GROWN);
         let clear = Frame::new().inner_margin(Margin::ZERO);
 
-        let trail_height = if is_small { 34.0 } else { (0.12 * height).clamp(48.0, 90.0) };
+        let trail_height = if is_small { 34.0 } else { (0.12 * height).clamp(48.0, 90.0 * grown) };
         let bottom = Panel::bottom("trail").exact_size(trail_height + GAP).show_separator_line(false);
         bottom
             .frame(Frame::new().inner_margin(Margin { top: GAP as i8, ..Margin::ZERO }))
-            .show(ui, |ui| trail::draw(ui, snapshot));
+            .show(ui, |ui| trail::draw(ui, snapshot, grown));
         let macros: Vec<&Macro> = MACROS.iter().filter(|of| hands.controls.look(of.id).is_some()).collect();
-        let macro_height = macro_knob::height(height);
+        let macro_height = macro_knob::height(height, grown);
         let below = Panel::bottom("macros").exact_size(macro_height).show_separator_line(false);
         below.frame(clear).show(ui, |ui| {
             let width =
                 (ui.available_width() / macros.len().max(1) as f32).min(1.35 * macro_height.max(MACRO_WIDTH));
-            let has_ends = macro_knob::ends_fit(ui, &macros, width);
+            let has_ends = macro_knob::ends_fit(ui, &macros, vec2(width, macro_height), grown);
             let left = 0.5 * (ui.available_width() - width * macros.len() as f32);
             ui.horizontal(|ui| {
                 ui.spacing_mut().item_spacing.x = 0.0;
                 ui.add_space(left.max(0.0));
                 for of in macros {
-                    macro_knob::draw(ui, hands, of, vec2(width, macro_height), has_ends);
+                    macro_knob::draw(ui, hands, of, vec2(width, macro_height), grown, has_ends);
                 }
             });
         });
         let side = Panel::left("dynamics")
-            .exact_size(if is_small { 84.0 } else { 108.0 })
+            .exact_size(if is_small { 84.0 } else { 108.0 * grown })
             .show_separator_line(false);
         side.frame(clear).show(ui, |ui| dynamic_meter::draw(ui, snapshot));
         egui::CentralPanel::default().frame(clear).show(ui, |ui| {
             let rect = ui.available_rect_before_wrap();
             stage::ground(ui, rect);
-            let clicked = stage::draw(ui, rect, snapshot, &self.motion, alterations, actions);
+            let clicked = stage::draw(ui, rect, snapshot, &self.motion, grown, (alterations, actions));
+            let title = instrument_title::draw(ui, rect, &snapshot.instrument, grown);
             if let Some(hole) = clicked {
                 trial.toggle(hole, snapshot, actions);
             }
             if !snapshot.alterations.is_empty() {
+                // Between what the wave is and the name of the instrument.
                 let place = Rect::from_min_max(
-                    rect.min + vec2(200.0, 8.0),
-                    pos2(rect.right() - 12.0, rect.top() + 8.0 + alteration_editor::ROW),
+                    rect.min + vec2(190.0 * grown, 2.0),
+                    pos2(title.left() - 16.0, rect.top() + 2.0 + alteration_editor::ROW),
                 );
                 let layout = egui::Layout::right_to_left(egui::Align::Center);
                 ui.scope_builder(egui::UiBuilder::new().max_rect(place).layout(layout), |ui| {
@@ -118,7 +127,8 @@ impl PlayView {
             } else if snapshot.sounding.is_none() {
                 let at = rect.center_bottom() - vec2(0.0, 10.0);
                 let text = "Play a key below, or blow. Click a hole to try it, drag it to move it.";
-                ui.painter().text(at, egui::Align2::CENTER_BOTTOM, text, theme::body(), c.ink);
+                let font = egui::FontId::proportional(13.0 * grown);
+                ui.painter().text(at, egui::Align2::CENTER_BOTTOM, text, font, c.ink);
             }
         });
     }

@@ -8,6 +8,7 @@ use chalumeau::editor::controls::Controls;
 use chalumeau::editor::note_names::NoteNames;
 use chalumeau::editor::snapshot::Connections;
 use chalumeau::editor::{Action, FeelTest, Tab};
+use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::units::SoundingNote;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers, vec2};
@@ -277,6 +278,32 @@ fn pictures_of_pages() {
     click(&mut window, "Blind");
     click(&mut window, "Side Y");
     save(&mut window, "blind");
+    click(&mut window, "Reveal");
+    save(&mut window, "revealed");
+    for (size, name) in [((1100.0, 720.0), "play"), ((700.0, 480.0), "play-small")] {
+        let mut window = Window::new(Tab::Play, size);
+        window.snapshot.borrow_mut().sounding = None;
+        click(&mut window, "Hole L3, closed");
+        save(&mut window, &format!("{name}-trying"));
+        let at = window.harness.get_by_label_contains("Hole R2, ").rect().center();
+        window.drag(at, vec2(-12.0, 0.0));
+        window.snapshot.borrow_mut().saved = Some(Ok("/home/music/mine_1.toml".into()));
+        window.harness.run();
+        save(&mut window, &format!("{name}-altered"));
+    }
+    for of in [Bundled::EFlat, Bundled::Bass] {
+        let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+        let file = of.file();
+        let larger = (file.length_m() / window.snapshot.borrow().instrument.length_m()) as f32;
+        {
+            let mut snapshot = window.snapshot.borrow_mut();
+            snapshot.standing.iter_mut().for_each(|(x_m, _)| *x_m *= larger);
+            snapshot.as_built = file.clone().into();
+            snapshot.instrument = file.into();
+        }
+        window.harness.run();
+        save(&mut window, &format!("play-{}", of.id()));
+    }
     let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
     *window.snapshot.borrow_mut() = chalumeau::editor::Snapshot::default();
     window.harness.run();
@@ -629,6 +656,15 @@ fn control_and_z_undo_in_a_window_without_a_host() {
     press(&mut window, Modifiers::COMMAND | Modifiers::SHIFT);
     assert_eq!(window.host.value("lip"), moved);
     assert!(window.actions().iter().all(|action| !matches!(action, Action::NoteOn { .. })), "no note");
+}
+
+#[test]
+fn the_play_view_says_which_instrument_is_loaded() {
+    let mut window = Window::new(Tab::Play, (700.0, 480.0));
+    window.harness.get_by_label("B flat clarinet, Boehm system, 67 cm long");
+    window.snapshot.borrow_mut().instrument = Bundled::Bass.file().into();
+    window.harness.run();
+    window.harness.get_by_label("B flat bass clarinet, Boehm system, 134 cm long");
 }
 
 #[test]

@@ -10,8 +10,8 @@ use crate::editor::host_marks;
 use crate::editor::key_steps::KeySteps;
 use crate::editor::linked_controllers;
 use crate::editor::slider::moved_by_pointer;
-use crate::editor::theme;
 use crate::editor::theme::Colours;
+use crate::editor::widgets::one_line;
 
 /// From end to end, points of dragging.
 const TRAVEL: f32 = 160.0;
@@ -30,22 +30,31 @@ pub struct Macro {
     pub ends: &'static str,
 }
 
-/// Height of a control with its words in a view of this height, points.
-pub fn height(view: f32) -> f32 {
-    (0.26 * view).clamp(82.0, 160.0)
+/// Height of a control with its words in a view of this height, points. `grown`: how much larger words are than in a window of
+/// the usual size.
+pub fn height(view: f32, grown: f32) -> f32 {
+    (0.27 * view).clamp(82.0, 160.0 * grown)
 }
 
-/// Whether what the ends mean fits below every control of this width.
-pub fn ends_fit(ui: &Ui, all: &[&Macro], width: f32) -> bool {
+/// In a control of this height, or a higher one, there is room for three lines of words, points.
+const ROOM_FOR_ENDS: f32 = 110.0;
+
+/// Whether what the ends mean fits below every control of this size.
+pub fn ends_fit(ui: &Ui, all: &[&Macro], size: Vec2, grown: f32) -> bool {
     let fits = |of: &&Macro| {
-        let words = ui.painter().layout_no_wrap(of.ends.to_owned(), theme::small(), Color32::WHITE);
-        words.size().x + 4.0 <= width
+        let words = ui.painter().layout_no_wrap(of.ends.to_owned(), small(grown), Color32::WHITE);
+        words.size().x + 4.0 <= size.x
     };
-    all.iter().all(fits)
+    size.y >= ROOM_FOR_ENDS && all.iter().all(fits)
 }
 
-/// Draws a control into a place of this size; `has_ends`: it says what its ends mean.
-pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, has_ends: bool) {
+fn small(grown: f32) -> FontId {
+    FontId::proportional(12.0 * grown)
+}
+
+/// Draws a control into a place of this size, with words `grown` times as large as in a window of the usual size; `has_ends`: it
+/// says what its ends mean, too.
+pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, has_ends: bool) {
     let Some(look) = hands.controls.look(of.id) else { return };
     let c = Colours::here(ui);
     let (rect, mut response) = ui.allocate_exact_size(size, Sense::click_and_drag());
@@ -69,31 +78,37 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, has_ends: bo
 
     let is_small = size.y < 100.0;
     // What the words leave.
-    let radius = 0.5 * (size.y - if is_small { 44.0 } else { 56.0 });
+    let words = match (is_small, has_ends) {
+        (true, _) => 44.0,
+        (false, true) => 62.0 * grown,
+        (false, false) => 56.0 * grown,
+    };
+    let radius = 0.5 * (size.y - words);
     let centre = pos2(rect.center().x, rect.top() + radius + 6.0);
     paint(ui, c, centre, radius, &look, value, is_touched);
     let painter = ui.painter();
     let at = pos2(centre.x, rect.top() + 2.0 * radius + 10.0);
-    let name = painter.text(
-        at,
-        Align2::CENTER_TOP,
-        of.name,
-        FontId::proportional(if is_small { 13.0 } else { 14.0 }),
-        c.ink,
-    );
+    let font = FontId::proportional(if is_small { 13.0 } else { 14.0 * grown });
+    let name = painter.text(at, Align2::CENTER_TOP, of.name, font, c.ink);
     let after = host_marks::paint(ui, &marks, name.right_center());
     let is_learning = linked_controllers::is_learning(hands, of.id);
     if !is_learning {
         linked_controllers::name(ui, hands, of.id, after);
     }
-    // The value while a hand is near, else what the ends mean. Beside the name there is no room to ask for a controller.
-    let (words, ink) = match (is_touched, has_ends) {
+    // Beside the name there is no room to ask for a controller.
+    let (words, ink) = match is_touched {
         _ if is_learning => (linked_controllers::ASKS, c.accent),
-        (true, _) => (text.as_str(), c.ink),
-        (false, true) => (of.ends, c.quiet),
-        (false, false) => ("", c.quiet),
+        true => (text.as_str(), c.ink),
+        false => (text.as_str(), c.quiet),
     };
-    painter.text(name.center_bottom() + vec2(0.0, 1.0), Align2::CENTER_TOP, words, theme::small(), ink);
+    let words = one_line(ui, words, small(grown), ink, size.x - 4.0);
+    let at = pos2(centre.x - 0.5 * words.size().x, name.bottom() + 1.0);
+    let bottom = at.y + words.size().y;
+    painter.galley(at, words, ink);
+    if has_ends {
+        let at = pos2(centre.x, bottom + 1.0);
+        painter.text(at, Align2::CENTER_TOP, of.ends, small(grown), c.quiet.gamma_multiply(0.85));
+    }
     response.widget_info(|| {
         let mut info = WidgetInfo::slider(ui.is_enabled(), f64::from(value), of.name);
         info.current_text_value = Some(text.clone());

@@ -1,8 +1,10 @@
 //! The clarinet on its stage: body, rings, keys, holes, fingers, and the sound pressure above.
 //!
 //! Places and sizes along the bore are those of the instrument file. The body is drawn somewhat thicker than it is, and the outer
-//! shape is plausible: the file knows the bore and the depth of the holes, but not the wood. Finger holes are in front, with
-//! pads that stand open; closed keys are on the upper edge.
+//! shape is plausible: the file knows the bore and the depth of the holes, but not the wood. A short clarinet is drawn short;
+//! one that is longer than the usual ones fills the stage, is slender, and has neck and bell of metal, as bass clarinets have.
+//! Finger holes are in front, with pads that stand open, and plates where no finger tip covers the hole; closed keys are on the
+//! upper edge.
 
 use egui::{
     Color32, CursorIcon, Mesh, Painter, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
@@ -17,12 +19,22 @@ use crate::editor::chart;
 use crate::editor::clarinet_view;
 use crate::editor::hole_names::{hole_title, is_thumb};
 use crate::editor::snapshot::Snapshot;
-use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 
-/// The body is at least this thick over its length on the screen, or it would be a line in a small window.
+/// The body is at least this thick over its length on the screen, or it would be a line in a small window. A longer one than
+/// [`USUAL_M`] is less thick, by the cube root.
 const LEAST_THICKNESS: f32 = 0.056;
+/// Length of the usual clarinets, in B flat and A, m: these fill the stage.
+const USUAL_M: f64 = 0.64;
+/// Clarinets from this length on have neck and bell of metal, m: alto clarinets, basset horns and larger ones.
+const METAL_M: f64 = 0.9;
+/// The widest hole that a finger tip covers, m of the radius. A wider one has a plate under the finger.
+const UNDER_FINGER_M: f64 = 6e-3;
+/// Thickness of the body in a window of the usual size, points: keys and rings grow with it.
+const USUAL_THICKNESS: f32 = 56.0;
+/// Most that keys and rings grow.
+const MOST_GROWN: f32 = 2.5;
 /// Most that the thickness is exaggerated.
 const MOST_EXAGGERATED: f32 = 2.4;
 /// Steps along the bore that the outline has.
@@ -47,14 +59,15 @@ fn loudness(snapshot: &Snapshot) -> f32 {
     if snapshot.heard.f0_hz.is_none() { 0.0 } else { chart::share((level - quiet) / (loud - quiet)) }
 }
 
-/// Draws the instrument as the user has altered it, lets holes be dragged, and gives back the hole that was clicked.
+/// Draws the instrument as the user has altered it, lets holes be dragged, and gives back the hole that was clicked. Its words are
+/// `grown` times as large as in a window of the usual size.
 pub fn draw(
     ui: &mut Ui,
     rect: Rect,
     snapshot: &Snapshot,
     motion: &Motion,
-    alterations: &mut AlterationEditor,
-    actions: &mut Vec<Action>,
+    grown: f32,
+    (alterations, actions): (&mut AlterationEditor, &mut Vec<Action>),
 ) -> Option<usize> {
     let file = &*AlterationEditor::shown(snapshot);
     let c = Colours::here(ui);
@@ -62,7 +75,7 @@ pub fn draw(
     let loudness = loudness(snapshot);
     {
         let painter = ui.painter_at(rect);
-        body.wave(&painter, c, &snapshot.standing, rect, loudness);
+        body.wave(&painter, c, &snapshot.standing, rect, loudness, grown);
         let size = vec2(1.04 * body.length(), 0.9 * body.thickness());
         let under = pos2(body.middle(), body.axis + 1.9 * body.thickness());
         shadow(&painter, Rect::from_center_size(under, size), 0.28);
@@ -123,6 +136,8 @@ struct Body<'a> {
     /// Points per metre, along and across.
     scale: f32,
     across: f32,
+    /// Size of keys and rings over that in a window of the usual size.
+    grown: f32,
     shape: BodyShape,
 }
 
@@ -130,13 +145,18 @@ impl<'a> Body<'a> {
     fn new(file: &'a InstrumentFile, rect: Rect) -> Self {
         let shape = BodyShape::new(file);
         let margin = (0.03 * rect.width()).clamp(16.0, 40.0);
-        let scale = (rect.width() - 2.0 * margin) / shape.length_m as f32;
+        let share = (shape.length_m / USUAL_M).min(1.0) as f32;
+        let scale = share * (rect.width() - 2.0 * margin) / shape.length_m as f32;
         let thin = 2.0 * (file.nominal_radius_m + shape.wall_m) / shape.length_m;
-        let exaggerated = (LEAST_THICKNESS / thin as f32).clamp(1.0, MOST_EXAGGERATED);
+        let least = LEAST_THICKNESS * (USUAL_M / shape.length_m).min(1.0).cbrt() as f32;
+        let exaggerated = (least / thin as f32).clamp(1.0, MOST_EXAGGERATED);
         // The bell has at most half of the height.
         let across = (scale * exaggerated).min(0.25 * rect.height() / shape.widest_m as f32);
         let axis = rect.top() + 0.62 * rect.height();
-        Self { file, left: rect.left() + margin, axis, scale, across, shape }
+        let left = rect.center().x - 0.5 * scale * shape.length_m as f32;
+        let thickness = 2.0 * across * (file.nominal_radius_m + shape.wall_m) as f32;
+        let grown = (thickness / USUAL_THICKNESS).clamp(1.0, MOST_GROWN);
+        Self { file, left, axis, scale, across, grown, shape }
     }
 
     fn x(&self, x_m: f64) -> f32 {
@@ -166,15 +186,44 @@ impl<'a> Body<'a> {
     fn mouthpiece_end_m(&self) -> f64 {
         let first = self.file.bore.first().map_or("", |segment| &segment.part);
         let part = self.file.bore.iter().take_while(|segment| segment.part == first);
-        part.map(|segment| segment.x_end_m).last().unwrap_or(0.0).min(0.12)
+        part.map(|segment| segment.x_end_m).last().unwrap_or(0.0).min(0.18)
+    }
+
+    /// Where the neck of metal ends and the bell of metal begins, m. The neck is the part below the mouthpiece, unless it has holes.
+    fn metal_m(&self, mouthpiece_m: f64) -> [f64; 2] {
+        let (bore, all_m) = (&self.file.bore, self.shape.length_m);
+        if all_m < METAL_M {
+            return [mouthpiece_m, all_m];
+        }
+        let neck =
+            bore.iter().find(|segment| segment.x_end_m > mouthpiece_m + 1e-6).map(|segment| &segment.part);
+        let neck = bore.iter().filter(|segment| Some(&segment.part) == neck);
+        let neck_m = neck.map(|segment| segment.x_end_m).next_back().unwrap_or(mouthpiece_m);
+        let bell = bore.last().map(|segment| &segment.part);
+        let bell = bore.iter().find(|segment| Some(&segment.part) == bell);
+        let bell_m = bell.map_or(all_m, |segment| segment.x_start_m);
+        let is_free =
+            |from_m: f64, to_m: f64| !self.file.holes.iter().any(|hole| (from_m..to_m).contains(&hole.x_m));
+        [
+            if is_free(mouthpiece_m, neck_m) { neck_m } else { mouthpiece_m },
+            if is_free(bell_m, all_m) { bell_m } else { all_m },
+        ]
     }
 
     /// The sound pressure over the body, higher and lighter when it is loud.
-    fn wave(&self, painter: &Painter, c: &Colours, wave: &[(f32, f32)], rect: Rect, loudness: f32) {
+    fn wave(
+        &self,
+        painter: &Painter,
+        c: &Colours,
+        wave: &[(f32, f32)],
+        rect: Rect,
+        loudness: f32,
+        grown: f32,
+    ) {
         // Straight, so that only pressure bends the line: above the keys and above the bell.
-        let body = self.outside(0.5 * self.shape.length_m) + 18.0;
+        let body = self.outside(0.5 * self.shape.length_m) + 18.0 * self.grown;
         let foot = self.axis - body.max(self.across * self.shape.widest_m as f32 + 4.0);
-        let room = foot - rect.top() - 16.0;
+        let room = foot - rect.top() - 18.0;
         if wave.len() < 2 || room < 20.0 || loudness <= 0.0 {
             return;
         }
@@ -199,9 +248,10 @@ impl<'a> Body<'a> {
         let ends = self.x(0.0)..=self.x(self.shape.length_m);
         painter.hline(ends, foot, Stroke::new(1.0, c.breath.gamma_multiply(0.3)));
         painter.add(Shape::line(wave.iter().map(point).collect(), Stroke::new(2.0, c.breath)));
+        let font = egui::FontId::proportional(12.0 * grown);
         if room > 60.0 {
             let at = rect.left_top() + vec2(self.left - rect.left() + 2.0, 2.0);
-            painter.text(at, egui::Align2::LEFT_TOP, "sound pressure in the bore", theme::small(), c.breath);
+            painter.text(at, egui::Align2::LEFT_TOP, "sound pressure in the bore", font, c.breath);
         }
     }
 
@@ -209,11 +259,18 @@ impl<'a> Body<'a> {
     fn paint(&self, painter: &Painter, c: &Colours, reed: f32, breath: f32) {
         let mouthpiece_m = self.mouthpiece_end_m();
         let ebonite = c.ebony.lerp_to_gamma(c.wood, 0.35);
-        let colour = |x_m: f64| if x_m < mouthpiece_m { ebonite } else { c.wood };
-        // Two stations at the end of the mouthpiece, so that its colour ends sharply.
+        let [neck_m, bell_m] = self.metal_m(mouthpiece_m);
+        let colour = |x_m: f64| match x_m {
+            _ if x_m < mouthpiece_m => ebonite,
+            _ if x_m < neck_m || x_m > bell_m => c.metal,
+            _ => c.wood,
+        };
+        // Two stations where the colour changes, so that it ends sharply.
         let mut places: Vec<f64> =
             (0..=STATIONS).map(|n| self.shape.length_m * n as f64 / STATIONS as f64).collect();
-        places.extend([mouthpiece_m - 1e-6, mouthpiece_m + 1e-6, BEAK_M]);
+        places.push(BEAK_M);
+        places.extend([mouthpiece_m, neck_m, bell_m].into_iter().flat_map(|x_m| [x_m - 1e-6, x_m + 1e-6]));
+        places.retain(|x_m| (0.0..=self.shape.length_m).contains(x_m));
         places.sort_by(f64::total_cmp);
         let stations: Vec<_> =
             places.into_iter().map(|x_m| (self.x(x_m), self.outside(x_m), colour(x_m))).collect();
@@ -221,18 +278,20 @@ impl<'a> Body<'a> {
         self.bell(painter, c);
         for pair in self.file.bore.windows(2).filter(|pair| pair[0].part != pair[1].part) {
             let (x, out) = (self.x(pair[0].x_end_m), self.outside(pair[0].x_end_m));
-            band(painter, self.axis, x - 3.5..=x + 3.5, out + 3.0, c.metal);
+            let half = 3.5 * self.grown;
+            band(painter, self.axis, x - half..=x + half, out + 3.0 * self.grown, c.metal);
         }
         self.reed(painter, c, reed);
         for share in [0.52, 0.64, 0.76] {
             let x = self.x(share * mouthpiece_m);
-            band(painter, self.axis, x - 3.0..=x + 3.0, self.outside(share * mouthpiece_m) + 2.5, c.metal);
+            let (half, out) = (3.0 * self.grown, self.outside(share * mouthpiece_m) + 2.5 * self.grown);
+            band(painter, self.axis, x - half..=x + half, out, c.metal);
         }
         if breath > 0.0 {
             glow(
                 painter,
                 pos2(self.x(0.0), self.axis + 2.0),
-                9.0 + 9.0 * breath,
+                self.grown * (9.0 + 9.0 * breath),
                 c.breath.gamma_multiply(0.75 * breath),
             );
         }
@@ -243,7 +302,7 @@ impl<'a> Body<'a> {
         let mouthpiece_m = self.mouthpiece_end_m();
         let end_m = 0.78 * mouthpiece_m;
         let lower = |x_m: f64| self.axis + self.outside(x_m);
-        let tip = pos2(self.x(0.0) - 1.0, self.axis + self.outside(0.0) + 1.0 + 3.5 * opening);
+        let tip = pos2(self.x(0.0) - 1.0, self.axis + self.outside(0.0) + self.grown * (1.0 + 3.5 * opening));
         let heel = pos2(self.x(end_m), lower(end_m) + 1.5);
         let middle = pos2(self.x(0.4 * end_m), lower(0.4 * end_m) + 1.5);
         let heel_low = heel + vec2(0.0, 0.16 * self.thickness());
@@ -293,18 +352,19 @@ impl<'a> Body<'a> {
             if places.len() < 2 {
                 continue;
             }
-            let y = self.axis - self.outside(0.5 * (from + to)) - 5.0;
-            let (left, right) = (self.x(from) - 8.0, self.x(to) + 8.0);
-            band(painter, y, left..=right, 2.0, c.metal);
+            let one = self.grown;
+            let y = self.axis - self.outside(0.5 * (from + to)) - 5.0 * one;
+            let (left, right) = (self.x(from) - 8.0 * one, self.x(to) + 8.0 * one);
+            band(painter, y, left..=right, 2.0 * one, c.metal);
             for x in [left, right] {
-                band(painter, y + 1.0, x - 2.5..=x + 2.5, 4.0, c.metal);
+                band(painter, y + one, x - 2.5 * one..=x + 2.5 * one, 4.0 * one, c.metal);
             }
         }
     }
 
     /// Half the width of a hole or its pad on the screen.
     fn half(&self, hole: &ToneHole) -> f32 {
-        (self.across * hole.radius_m as f32).clamp(3.0, 0.42 * self.thickness())
+        (self.across * hole.radius_m as f32).clamp(3.0 * self.grown, 0.42 * self.thickness())
     }
 
     /// Where a hole is.
@@ -312,8 +372,8 @@ impl<'a> Body<'a> {
         let half = self.half(hole);
         match hole.kind {
             HoleKind::KeyClosed => {
-                let centre = pos2(self.x(hole.x_m), self.axis - self.outside(hole.x_m) - 4.0);
-                Rect::from_center_size(centre, vec2(2.0 * half + 6.0, 12.0))
+                let centre = pos2(self.x(hole.x_m), self.axis - self.outside(hole.x_m) - 4.0 * self.grown);
+                Rect::from_center_size(centre, vec2(2.0 * half + 6.0, 12.0 * self.grown))
             }
             HoleKind::Finger | HoleKind::PadOpen => {
                 // The thumb is behind: its hole looks round the lower edge.
@@ -328,7 +388,7 @@ impl<'a> Body<'a> {
 
     /// One hole with its finger, pad or key. `flow` is the sound that comes out, 0..=1.
     fn hole(&self, painter: &Painter, c: &Colours, hole: &ToneHole, opening: f32, flow: f32, is_hot: bool) {
-        let (place, half) = (self.place(hole), self.half(hole));
+        let (place, half, one) = (self.place(hole), self.half(hole), self.grown);
         let centre = place.center();
         let edge = if is_hot { Stroke::new(2.0, c.accent) } else { Stroke::new(1.0, lit(c.metal, 0.6)) };
         let air = lit(c.ebony, 0.6).lerp_to_gamma(c.breath, 0.85 * flow);
@@ -336,30 +396,38 @@ impl<'a> Body<'a> {
             glow(
                 painter,
                 self.mouth_of(hole, centre),
-                half + 12.0 * flow,
+                half + 12.0 * one * flow,
                 c.breath.gamma_multiply(0.6 * flow),
             );
         }
         match hole.kind {
             HoleKind::KeyClosed => {
-                let lifted = centre - vec2(0.0, 0.7 * LIFT * opening);
+                let lifted = centre - vec2(0.0, 0.7 * one * LIFT * opening);
                 if opening > 0.05 {
-                    let mouth = Rect::from_center_size(centre + vec2(0.0, 4.0), vec2(2.0 * half, 4.0));
+                    let mouth =
+                        Rect::from_center_size(centre + vec2(0.0, 4.0 * one), vec2(2.0 * half, 4.0 * one));
                     painter.add(Shape::ellipse_filled(mouth.center(), 0.5 * mouth.size(), air));
                 }
-                plate(painter, lifted, vec2(half + 3.0, 4.5), c.metal, edge);
+                plate(painter, lifted, vec2(half + 3.0 * one, 4.5 * one), c.metal, edge);
             }
             HoleKind::PadOpen => {
-                painter.circle(centre, half + 1.0, air, Stroke::new(1.5, lit(c.metal, 0.8)));
-                let lifted = centre - vec2(0.0, LIFT * opening);
+                painter.circle(centre, half + one, air, Stroke::new(1.5 * one, lit(c.metal, 0.8)));
+                let lifted = centre - vec2(0.0, one * LIFT * opening);
                 let tilt = 1.0 - 0.45 * opening;
-                plate(painter, lifted, vec2(half + 3.0, (half + 3.0) * tilt), c.metal, edge);
+                plate(painter, lifted, vec2(half + 3.0 * one, (half + 3.0 * one) * tilt), c.metal, edge);
             }
             HoleKind::Finger => {
-                painter.circle_filled(centre, half + 3.0, lit(c.metal, 0.85));
+                painter.circle_filled(centre, half + 3.0 * one, lit(c.metal, 0.85));
                 painter.circle(centre, half, air, edge);
+                let lifted = centre - vec2(0.0, one * LIFT * opening);
+                let has_plate = hole.radius_m > UNDER_FINGER_M;
+                if has_plate {
+                    let tilt = 1.0 - 0.45 * opening;
+                    plate(painter, lifted, vec2(half + 2.0 * one, (half + 2.0 * one) * tilt), c.metal, edge);
+                }
                 if opening < 0.99 {
-                    finger(painter, c, centre - vec2(0.0, LIFT * opening), half, 1.0 - 0.8 * opening);
+                    let half = if has_plate { 0.7 * half } else { half };
+                    finger(painter, c, lifted, half, one, 1.0 - 0.8 * opening);
                 }
             }
         }
@@ -367,14 +435,14 @@ impl<'a> Body<'a> {
 
     /// Where the sound of a hole comes out.
     fn mouth_of(&self, hole: &ToneHole, centre: Pos2) -> Pos2 {
-        if hole.kind == HoleKind::KeyClosed { centre + vec2(0.0, 4.0) } else { centre }
+        if hole.kind == HoleKind::KeyClosed { centre + vec2(0.0, 4.0 * self.grown) } else { centre }
     }
 }
 
-/// The tip of a finger on a hole.
-fn finger(painter: &Painter, c: &Colours, centre: Pos2, half: f32, presence: f32) {
+/// The tip of a finger on a hole; `one` is a point in a window of the usual size.
+fn finger(painter: &Painter, c: &Colours, centre: Pos2, half: f32, one: f32, presence: f32) {
     let colour = |light: f32| lit(c.skin, light).gamma_multiply(presence);
-    let size = vec2(half + 5.0, half + 3.0);
+    let size = vec2(half + 5.0 * one, half + 3.0 * one);
     painter.add(Shape::ellipse_filled(
         centre + vec2(0.0, 2.0),
         size,
@@ -404,5 +472,34 @@ mod tests {
         };
         assert_eq!(below_axis("L1"), 0.0);
         assert!(below_axis("THUMB") > 0.3 * body.thickness(), "{}", below_axis("THUMB"));
+    }
+
+    /// What tells instruments apart: a short one is short, a bass is slender, silver at both ends, and has plates.
+    #[test]
+    fn instruments_are_told_by_their_looks() {
+        use chalumeau_core::bore::bundled::Bundled;
+        let rect = Rect::from_min_size(Pos2::ZERO, vec2(1000.0, 320.0));
+        let looks = |of: Bundled, see: fn(&Body<'_>) -> f32| see(&Body::new(&of.file(), rect));
+        let length = |of| looks(of, |body| body.length());
+        assert!(length(Bundled::EFlat) < 0.82 * length(Bundled::BFlat));
+        assert!(
+            length(Bundled::EFlat) < 0.9 * length(Bundled::C) && length(Bundled::C) < length(Bundled::BFlat)
+        );
+        let slender = |of| looks(of, |body| body.thickness() / body.length());
+        assert!(slender(Bundled::Bass) < 0.85 * slender(Bundled::BFlat));
+        let silver = |of| {
+            looks(of, |body| {
+                let mouthpiece_m = body.mouthpiece_end_m();
+                let [neck_m, bell_m] = body.metal_m(mouthpiece_m);
+                (neck_m - mouthpiece_m + body.shape.length_m - bell_m) as f32
+            })
+        };
+        assert!(silver(Bundled::Bass) > 0.2 && silver(Bundled::A) == 0.0);
+        let plates = |of: Bundled| {
+            let file = of.file();
+            let holes = file.holes.iter().filter(|hole| hole.kind == HoleKind::Finger);
+            holes.filter(|hole| hole.radius_m > UNDER_FINGER_M).count()
+        };
+        assert!(plates(Bundled::Bass) > 3 && plates(Bundled::A) == 0);
     }
 }

@@ -1,6 +1,6 @@
 //! The last ten seconds: pitch as a line, loudness as its thickness and light.
 
-use egui::{Align2, Color32, CornerRadius, Mesh, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Color32, CornerRadius, FontId, Mesh, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use crate::editor::chart;
 use crate::editor::snapshot::{Snapshot, Track};
@@ -36,8 +36,8 @@ fn played(track: &Track) -> Vec<Option<f32>> {
     (0..count).map(|index| sounding[index].filter(|_| is_past_attack(index))).collect()
 }
 
-/// Draws the trail into all of the place.
-pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
+/// Draws the trail into all of the place; its words are `grown` times as large as in a window of the usual size.
+pub fn draw(ui: &mut Ui, snapshot: &Snapshot, grown: f32) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     let painter = ui.painter_at(rect);
@@ -46,8 +46,13 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
     let pitches = played(track);
     let count = pitches.len();
     let text = "last 10 s: pitch and loudness";
-    let title =
-        painter.text(rect.left_top() + vec2(10.0, 5.0), Align2::LEFT_TOP, text, theme::small(), c.quiet);
+    let title = painter.text(
+        rect.left_top() + vec2(10.0, 5.0),
+        Align2::LEFT_TOP,
+        text,
+        FontId::proportional(12.0 * grown),
+        c.quiet,
+    );
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, text));
     let heard = || pitches.iter().copied().flatten();
     if count < 2 || heard().next().is_none() {
@@ -58,7 +63,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
     let middle = 0.5 * (low + high);
     let half = (0.5 * (high - low)).max(0.5 * LEAST_SEMITONES) + 0.5;
     let band = egui::Rect::from_min_max(
-        pos2(rect.left() + 10.0, title.bottom().min(rect.top() + 20.0)),
+        pos2(rect.left() + 10.0, title.bottom().min(rect.top() + 20.0 * grown)),
         rect.max - vec2(10.0, 6.0),
     );
     let room = 10.0 / track.step_s.max(1e-3);
