@@ -238,6 +238,11 @@ fn column(
     actions: &mut Vec<Action>,
 ) {
     let c = Colours::here(ui);
+    // Who hears nothing looks for it first.
+    if let Some(connections) = &snapshot.connections {
+        show_connections(ui, connections);
+        ui.add_space(8.0);
+    }
     ui.label(RichText::new("Names of notes").color(c.quiet));
     let mut chosen = usize::from(*names == NoteNames::Concert);
     let about = "As they are written for this instrument, or as they sound; in every view and on the keys.";
@@ -259,9 +264,6 @@ fn column(
     heading(ui, "Output");
     slider(ui, hands, "gain");
     choice(ui, hands, "qual");
-    if let Some(connections) = &snapshot.connections {
-        show_connections(ui, connections);
-    }
 }
 
 /// Where sound and MIDI go and come from, in a program without a host.

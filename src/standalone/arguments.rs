@@ -243,7 +243,9 @@ impl Args {
                 )
             }
         };
-        Connections { sound, midi: Vec::new(), how: how.to_owned() }
+        // Without a backend, no MIDI input is opened.
+        let midi = if backend == Backend::Dummy { vec!["none".to_owned()] } else { Vec::new() };
+        Connections { sound, midi, how: how.to_owned() }
     }
 
     /// The JACK ports to connect to.
