@@ -436,7 +436,7 @@ fn assert_smooth(slurs: &[Slurred]) {
     let (hole_db, back_ms) = octaves(slurs);
     let clicks_db = [0.5, 0.9].map(|share| quantile(slurs.iter().map(|s| s.click_db), share));
     println!("octaves: hole {hole_db:.1} dB, back {back_ms:.0} ms; clicks {clicks_db:.1?} dB");
-    assert!(hole_db <= 10.2 && back_ms <= 45.0);
+    assert!(hole_db <= 9.5 && back_ms <= 47.0);
     assert!(slurs.iter().all(|s| s.bump_db <= 2.0));
     assert!(clicks_db[0] <= 1.0 && clicks_db[1] <= 3.0);
 }
@@ -444,6 +444,28 @@ fn assert_smooth(slurs: &[Slurred]) {
 #[test]
 fn all_slurs_arrive_without_bumps() {
     assert_smooth(&slurs());
+}
+
+/// Down over the break the old note died in the lengthening column: into the throat soft slurs had holes of up to 31 dB, and leaps into the low chalumeau
+/// half of theirs of more than 25.
+#[test]
+fn slurs_down_over_the_break_keep_sounding() {
+    // Names, new notes, from how many semitones on; how deep half of the holes, nine tenths, and all may be, dB.
+    let throat = ("into the throat", 64..=70, 1, [6.0, 12.0, 18.0]);
+    let low = ("leaps into the low chalumeau", 52..=63, 13, [17.5, 25.0, 38.0]);
+    for (name, to, least, most_db) in [throat, low] {
+        let pairs = (71..=84).flat_map(|from| to.clone().map(move |to| (from, to)));
+        let all: Vec<(u8, u8, u8)> = pairs
+            .filter(|(from, to)| from - to >= least)
+            .flat_map(|(from, to)| [20, 45, 76].map(|value| (from, to, value)))
+            .collect();
+        let slurs = each(all.len(), |n| slurred(all[n].0, all[n].1, all[n].2));
+        let holes_db = [0.5, 0.9, 1.0].map(|share| quantile(slurs.iter().map(|s| s.hole_db), share));
+        let lost = slurs.iter().filter(|s| !s.arrives).count();
+        println!("{name}: {} slurs, {lost} lost, holes {holes_db:.1?} dB", slurs.len());
+        assert_eq!(lost, 0, "{name}");
+        assert!(holes_db.iter().zip(most_db).all(|(hole, most)| *hole <= most), "{name}: {holes_db:.1?} dB");
+    }
 }
 
 #[test]

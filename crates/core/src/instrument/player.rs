@@ -419,6 +419,8 @@ impl Player {
             interval_cents: cents(model.notes_hz[fingering], model.notes_hz[from]),
             registers: (model.registers[from], model.registers[fingering]),
             place: model.place(fingering),
+            note_hz: model.notes_hz[fingering],
+            over_lowest: model.notes_hz[fingering] / model.lowest_hz,
         });
         match (slur, self.settings.breath_response) {
             (Some(slur), BreathResponse::Played) => {

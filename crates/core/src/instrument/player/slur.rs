@@ -13,8 +13,12 @@
 //! note. There the fingers are quick, and the lip damps the reed a little. Into the altissimo it lets the reed swing more freely, so that
 //! the new note grows sooner. Within the altissimo neighbours have fingerings of their own, so the fingers move as where the register changes.
 //!
-//! Leaps down into the low chalumeau by more than an octave do not arrive so: they keep the twelfth. There the lip takes nearly all of the
-//! old note away, which is heard as a light tongue.
+//! Leaps down into the low chalumeau by more than an octave do not arrive so: they keep the twelfth. There the lip takes most of the old note away, which is
+//! heard as a light tongue. It damps the reed the more, the lower the new note is: what a damped reed takes from a mode grows with the square of its
+//! frequency, and what the bore takes with the root.
+//!
+//! Down into the throat the old mode dies in the lengthening column, and the new one grows from little. There the fingers take more time, and the lip lets
+//! the reed swing a little more freely, unless it beats.
 
 use super::lip_glide::LipHelp;
 
@@ -35,10 +39,12 @@ const DAMPED: LipHelp = LipHelp { damping: 1.85, length_s: 0.025 };
 /// Leaps down into the low chalumeau over more than so many cents: more than an octave. Above it they arrive by themselves; with the lip's help
 /// they fall silent for 0.1 s.
 const WIDE_CENTS: f64 = 1_250.0;
-/// What the lip does in these. Of 188 from written B4..C6 into E3..A#4, each at CC 16, 58, 78 and 108, 345 of 752 stay on the old mode without
-/// it, 79 with a factor of 3 for 50 ms, 4 with 4 for 60 ms, and none with 6 for 70 ms, at CC 8 to 127. A bump on the way, of up to 14 dB,
-/// goes too (`docs/tone.md`).
-const WIDE_DAMPED: LipHelp = LipHelp { damping: 6.0, length_s: 0.07 };
+/// What the lip adds to the factor on the reed's damping in these, into the lowest note. Of 612 from written B4..C6 into E3..D#4, at four values of CC 2,
+/// none is lost with it. With 2.5, three into E3 are lost at full breath; six times the damping on every note made holes of 25 dB in the median (`docs/tone.md`).
+const WIDE_DAMPING: f64 = 3.5;
+/// How long the lip helps in these and into the throat, periods of the new note: from 0.1 s into written E3 to 0.035 s into A#4 on a B flat clarinet. In
+/// 0.1 s at most on every note, 2 of 459 slurs on the bass are lost with twice this damping.
+const PERIODS: f64 = 15.0;
 /// Factor on the legato time in these. Measured with a factor of 4: at 1.8 the holes are 3 to 4 dB deeper, and as many slurs arrive.
 const WIDE_TIME: f64 = 1.0;
 /// What the lip does from the altissimo into the clarion, and the factor on the legato time. Of 630 slurs from written C#6..A6 to B4..C6 at CC 20
@@ -49,6 +55,14 @@ const FROM_ALTISSIMO_DAMPED: LipHelp = LipHelp { damping: 1.3, length_s: 0.03 };
 const FROM_ALTISSIMO_TIME: f64 = 0.8;
 /// Share of the time of the slur that each finger takes there. With 0.55 a tenth more take longer than 0.1 s.
 const FROM_ALTISSIMO_SHARE: f64 = 0.4;
+/// What the lip takes from the factor on the reed's damping in slurs down over the break into the throat. With 0.2 holes are 2 dB shallower, and at CC 45
+/// bumps up to 1 dB louder (`docs/tone.md`).
+const THROAT_FREEDOM: f64 = 0.15;
+/// Mouth over closing pressures between which it ceases to. Loud notes grow soon by themselves, and a beating reed that swings freely squeaks: at CC 108 and
+/// 127 it makes bumps of 3 dB and clicks of 12.
+const THROAT_LOUD: (f64, f64) = (0.45, 0.6);
+/// Factor on the legato time in these. Measured with this lip, at 2.9, 3.5 and 4: nine tenths of the holes are 12.8, 11.3 and 10.3 dB deep.
+const THROAT_TIME: f64 = 4.0;
 /// What the lip does up into the altissimo. Of 208 slurs from C5..C6 to F#6..A6, nine tenths have arrived after 235 ms without it, 175 with
 /// it, and 115 with a factor of 0.5 for 60 ms, which makes them 7 dB louder on the way than either note.
 const INTO_ALTISSIMO_DAMPED: LipHelp = LipHelp { damping: 0.7, length_s: 0.05 };
@@ -94,6 +108,10 @@ pub struct Slur {
     pub registers: (u8, u8),
     /// [Place](super::dynamics::PlayerModel::place) of the new note.
     pub place: f64,
+    /// Frequency of the new note, Hz.
+    pub note_hz: f64,
+    /// The same over that of the lowest note of the instrument.
+    pub over_lowest: f64,
 }
 
 impl Slur {
@@ -110,6 +128,17 @@ impl Slur {
         down && self.place < LOW_PLACE && -self.interval_cents > WIDE_CENTS
     }
 
+    /// Whether it comes down over the break into the throat.
+    fn is_into_the_throat(&self) -> bool {
+        self.registers.0 > self.registers.1 && self.registers.1 == 1 && self.place >= LOW_PLACE
+    }
+
+    /// What the lip does in a leap down by more than an octave.
+    fn wide_help(&self) -> LipHelp {
+        let ratio = self.over_lowest;
+        LipHelp { damping: 1.0 + WIDE_DAMPING / (ratio * ratio.sqrt()), length_s: PERIODS / self.note_hz }
+    }
+
     /// Whether both notes lie in one register, so that the air column goes on as it swings.
     pub fn is_within_a_register(&self) -> bool {
         self.registers.0 == self.registers.1
@@ -118,7 +147,13 @@ impl Slur {
     /// What a player's lip does at a mouth over closing pressure; `None` where the fingers are enough.
     pub fn lip_help(&self, gamma: f64) -> Option<LipHelp> {
         if self.is_wide() {
-            return Some(WIDE_DAMPED);
+            return Some(self.wide_help());
+        }
+        if self.is_into_the_throat() {
+            let (soft, loud) = THROAT_LOUD;
+            let softness = ((loud - gamma) / (loud - soft)).clamp(0.0, 1.0);
+            let damping = 1.0 - THROAT_FREEDOM * softness;
+            return Some(LipHelp { damping, length_s: PERIODS / self.note_hz });
         }
         match self.registers {
             (3, 2) => Some(FROM_ALTISSIMO_DAMPED),
@@ -139,6 +174,7 @@ impl Slur {
                 (3, 3) if self.interval_cents > 0.0 && gamma > 0.0 => UP_TIME,
                 (3, 3) => ALTISSIMO_DOWN_TIME,
                 (3, 2) => FROM_ALTISSIMO_TIME,
+                (2 | 3, 1) if self.is_into_the_throat() => THROAT_TIME,
                 (2 | 3, 1) => DOWN_TIME,
                 _ => OTHER_TIME,
             },
@@ -157,7 +193,14 @@ mod tests {
     use super::*;
 
     fn slur(semitones: f64, registers: (u8, u8), place: f64) -> Slur {
-        Slur { interval_cents: 100.0 * semitones, registers, place }
+        let over_lowest = (20.5 / 12.0 * (place + 1.0)).exp2();
+        Slur {
+            interval_cents: 100.0 * semitones,
+            registers,
+            place,
+            note_hz: 147.0 * over_lowest,
+            over_lowest,
+        }
     }
 
     #[test]
@@ -166,7 +209,6 @@ mod tests {
         let others = [
             (leap, 0.44),
             (slur(-8.0, (2, 1), -0.6), 0.49),
-            (slur(-12.0, (2, 1), -0.2), 0.6),
             (slur(12.0, (1, 2), 0.1), 0.9),
             (slur(-2.0, (2, 1), -0.5), 0.9),
             (slur(-11.0, (2, 2), 0.0), 0.9),
@@ -184,9 +226,16 @@ mod tests {
     fn leaps_down_by_more_than_an_octave_always_need_the_lip() {
         for registers in [(2, 1), (3, 1)] {
             let leap = slur(-13.0, registers, -0.5);
-            assert_eq!(leap.lip_help(0.1), Some(WIDE_DAMPED));
+            assert!(leap.lip_help(0.1).is_some_and(|lip| lip.damping > 2.0));
             assert!(leap.walk(0.1).mouth_first && leap.walk(0.1).time == WIDE_TIME);
-            assert_eq!(slur(-13.0, registers, -0.4).lip_help(0.9), None, "into the throat");
+            let lower = slur(-13.0, registers, -0.9).lip_help(0.1);
+            assert!(lower.zip(leap.lip_help(0.1)).is_some_and(|(lower, lip)| {
+                lower.damping > lip.damping && lower.length_s > lip.length_s
+            }));
+            let into_the_throat = slur(-13.0, registers, -0.4);
+            assert!(into_the_throat.lip_help(0.5).is_some_and(|lip| lip.damping < 1.0));
+            assert!(into_the_throat.lip_help(0.9).is_some_and(|lip| lip.damping == 1.0));
+            assert!(!into_the_throat.walk(0.9).mouth_first && into_the_throat.walk(0.9).time == THROAT_TIME);
         }
     }
 
@@ -199,7 +248,7 @@ mod tests {
 
     #[test]
     fn fingers_are_quicker_up_over_the_break_slower_down_and_overlap_within_a_register() {
-        let walks = [(1, 1), (1, 2), (2, 1), (2, 2)].map(|registers| slur(2.0, registers, 0.0).walk(0.6));
+        let walks = [(1, 1), (1, 2), (2, 1), (2, 2)].map(|registers| slur(2.0, registers, -0.5).walk(0.6));
         assert_eq!(walks.map(|walk| walk.time), [OTHER_TIME, UP_TIME, DOWN_TIME, OTHER_TIME]);
         let [within, up, down, _] = walks.map(|walk| walk.finger_share);
         assert!(within > up && up == down);
