@@ -55,7 +55,7 @@ pub use attack::Attack;
 use attack::Onset;
 use breath::Breath;
 use dynamics::LipShape;
-use ear::Ear;
+use ear::{Begun, Ear};
 use fingers::Fingers;
 use glissando::Slide;
 use inflection::Inflection;
@@ -314,7 +314,10 @@ impl Player {
         if !slurred {
             self.prepare();
             self.swaying.swing.begin_note();
-            self.lip_glide.help(retongued::lip_help(self.ear.amplitude(), model.place(fingering)));
+            let place = model.place(fingering);
+            let high = attack::lip_help(place, model.notes_hz[fingering]);
+            let ringing = || retongued::lip_help(self.ear.amplitude(), place);
+            self.lip_glide.help(high.or_else(ringing));
         }
         self.finger(fingering, slurred, model, voice);
         let slap = self.settings.articulation.slap;
@@ -410,7 +413,7 @@ impl Player {
         self.fingers.choose(alternate);
         let alternate = alternate.and_then(|at| model.alternates.get(at));
         self.fingered_cents += alternate.map_or(0.0, |alternate| alternate.cents);
-        self.ear.begin(false);
+        self.ear.begin(if slurred { Begun::Slurred } else { Begun::Tongued });
         if !slurred {
             return self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
         }
@@ -427,7 +430,9 @@ impl Player {
                 let gamma = self.breath.gamma();
                 self.lip_glide.help(slur.lip_help(gamma));
                 let ticks = self.legato_ticks(model);
-                self.ear.begin(slur.is_within_a_register());
+                if slur.is_within_a_register() {
+                    self.ear.begin(Begun::SlurredWithin);
+                }
                 self.fingers.walk_to(fingering, ticks, slur.walk(gamma), model, voice.lattice_mut());
                 self.posture = None;
             }

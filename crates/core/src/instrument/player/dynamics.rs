@@ -45,7 +45,7 @@ pub const NODE_DYNAMICS: [f64; NODES] = [0.0, 0.2, 0.4, 0.56, 0.7, 0.82, 0.92, 1
 const HALF_COMPASS_OCTAVES: f64 = 20.5 / 12.0;
 /// Places between which the flow strength goes over to that of the altissimo: written A5 and E flat 6 of a B flat clarinet.
 const ALTISSIMO: (f64, f64) = (0.42, 0.7);
-/// Places between which the lip comes to open the reed further: written C6 and E flat 6.
+/// Places between which the lip comes to open the reed further, and notes to begin as those of the altissimo: written C6 and E flat 6.
 const HIGH: (f64, f64) = (0.57, 0.7);
 /// Places between which the lip comes to close the reed at every dynamic: written G6 and G#6.
 const TOP: (f64, f64) = (0.905, 0.955);
@@ -53,6 +53,11 @@ const TOP: (f64, f64) = (0.905, 0.955);
 const ZETAS: (f64, f64) = (0.14, 0.5);
 /// The place of a note far outside the compass counts as this.
 const FARTHEST: f64 = 1.25;
+
+/// How far a place lies on the way to the highest notes, 0..=1.
+pub(super) fn high(place: f64) -> f64 {
+    on_the_way(place, HIGH)
+}
 
 /// How far a place lies on the way from one to the other, 0..=1, smoothly.
 fn on_the_way(place: f64, (from, to): (f64, f64)) -> f64 {
