@@ -219,27 +219,20 @@ impl Args {
     /// Where sound goes with this backend, and how to choose another place, for the window. MIDI inputs come later.
     pub fn connections(&self, backend: Backend) -> Connections {
         let (sound, how) = match backend {
-            Backend::Dummy => ("none", "To hear it, start the program without --backend dummy."),
+            Backend::Dummy => ("none".to_owned(), "To hear it, start the program without --backend dummy."),
             Backend::Auto | Backend::Jack => (
-                "JACK",
+                "JACK".to_owned(),
                 "A patchbay for JACK connects other outputs and MIDI devices. For a sound card without JACK, start the program with \
                  --output-device \"NAME\".",
             ),
-            #[allow(unreachable_patterns)]
-            _ => (
-                self.output_device.as_deref().unwrap_or("the system's output"),
-                "For another, start the program with --output-device \"NAME\" or --midi-input \"NAME\"; an empty name lists them.",
-            ),
-        };
-        let sound = match backend {
-            Backend::Dummy | Backend::Auto | Backend::Jack => sound.to_owned(),
+            // Where the system has no other backend, the two above are all.
             #[allow(unreachable_patterns)]
             _ => {
-                format!(
-                    "{sound} ({}), {} Hz, blocks of {}",
-                    backend.name(),
-                    self.sample_rate,
-                    self.period_size
+                let device = self.output_device.as_deref().unwrap_or("the system's output");
+                let (name, rate_hz, frames) = (backend.name(), self.sample_rate, self.period_size);
+                (
+                    format!("{device} ({name}), {rate_hz} Hz, blocks of {frames}"),
+                    "For another, start the program with --output-device \"NAME\" or --midi-input \"NAME\"; an empty name lists them.",
                 )
             }
         };
