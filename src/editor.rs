@@ -361,7 +361,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
                 files.close();
             }
         });
-    // White keys stay longer than wide, and no longer than on an instrument.
+    // In a wide window they grow with the width, so that white keys stay longer than wide.
     let keys = (0.13 * height).clamp(52.0, 110.0f32.max(0.11 * width));
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
     let is_text = hands.entry.is_some() || ui.ctx().text_edit_focused();

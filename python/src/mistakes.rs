@@ -3,6 +3,7 @@
 use chalumeau::parameters::PARAMETERS;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::IntoPyDict;
 use std::cell::Cell;
 use std::fmt::Display;
 
@@ -44,8 +45,9 @@ pub fn watched<T, E: Display>(work: impl FnOnce(fn() -> bool) -> Result<T, E>) -
 pub fn warn(said: &str) {
     let said = ["note: ", "warning: "].iter().find_map(|mark| said.strip_prefix(mark)).unwrap_or(said);
     let warned = Python::attach(|py| {
-        let warnings = py.import("warnings")?;
-        warnings.call_method1("warn", (said,)).map(drop)
+        // Of the line that called the package.
+        let stacklevel = [("stacklevel", 2)].into_py_dict(py)?;
+        py.import("warnings")?.call_method("warn", (said,), Some(&stacklevel)).map(drop)
     });
     if let Err(raised) = warned {
         RAISED.set(Some(raised));

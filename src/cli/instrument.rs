@@ -329,16 +329,7 @@ impl New {
             vent_radius_m: self.vent_mm.map(|mm| mm / 2e3),
             reed_volume_m3: self.reed_volume / 1e9,
         };
-        let file = cylinder.build(Air::default())?;
-        if file.length_m() > LONGEST_M {
-            return Err(Failure::Usage(format!(
-                "--notes: {} needs a bore {:.0} mm long, and the longest of an instrument file is {:.0} mm; begin with a higher note",
-                file.lowest(),
-                1e3 * file.length_m(),
-                1e3 * LONGEST_M
-            )));
-        }
-        Ok(file)
+        Ok(cylinder.build(Air::default())?)
     }
 
     fn scaled(&self, factor: f64) -> Result<InstrumentFile, Failure> {
@@ -363,9 +354,6 @@ impl New {
         Ok(file)
     }
 }
-
-/// Longest bore of the format, m (docs/instrument-file.md).
-const LONGEST_M: f64 = 3.0;
 
 /// Least and largest scale factor.
 const LIMITS_OF_SCALE: [f64; 2] = [0.2, 5.0];

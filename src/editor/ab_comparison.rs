@@ -228,12 +228,12 @@ mod tests {
         };
         step(&mut history, 0.1, 0.2);
         compare.go(ComparisonSide::B, with_lip(0.2, ""), &mut history);
-        assert!(history.undoable("").is_none(), "B has no step yet");
+        assert!(history.undoable(None).is_none(), "B has no step yet");
         step(&mut history, 0.2, 0.9);
         compare.go(ComparisonSide::A, with_lip(0.9, ""), &mut history);
-        assert_eq!(history.undo("", &Alterations::default()).values, [("lip", 0.1)]);
+        assert_eq!(history.undo(None, &Alterations::default()).values, [("lip", 0.1)]);
         compare.go(ComparisonSide::B, with_lip(0.1, ""), &mut history);
-        assert_eq!(history.undo("", &Alterations::default()).values, [("lip", 0.2)]);
+        assert_eq!(history.undo(None, &Alterations::default()).values, [("lip", 0.2)]);
     }
 
     #[test]

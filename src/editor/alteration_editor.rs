@@ -119,7 +119,7 @@ impl AlterationEditor {
     }
 
     fn ask(&mut self, wanted: Alterations, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-        if wanted != *snapshot.alterations {
+        if snapshot.can_alter && wanted != *snapshot.alterations {
             self.asked = Some(Move {
                 gesture: self.gesture,
                 instrument_key: snapshot.instrument_key.clone(),
@@ -271,7 +271,10 @@ impl AlterationEditor {
         let value = DragValue::new(mm).speed(0.05).fixed_decimals(1).min_decimals(1);
         let response = ui.add(value).on_hover_text(about);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, label));
-        if response.drag_started() || response.gained_focus() {
+        // A screen reader steps the number without focus or drag.
+        let is_stepped =
+            response.changed() && !response.dragged() && !response.has_focus() && !response.lost_focus();
+        if response.drag_started() || response.gained_focus() || is_stepped {
             self.begin(snapshot);
         }
         let unit = if is_narrow { "mm" } else { unit };

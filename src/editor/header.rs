@@ -211,13 +211,13 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
 
 /// Takes the last step back.
 pub fn undo_step(hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-    let restored = hands.history.undo(&snapshot.instrument_key, &snapshot.alterations);
+    let restored = hands.history.undo(snapshot.altered_key(), &snapshot.alterations);
     restore(restored, hands, actions);
 }
 
 /// Does the last step that was taken back again.
 pub fn redo_step(hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-    let restored = hands.history.redo(&snapshot.instrument_key, &snapshot.alterations);
+    let restored = hands.history.redo(snapshot.altered_key(), &snapshot.alterations);
     restore(restored, hands, actions);
 }
 
@@ -240,7 +240,7 @@ fn step_name(hands: &Hands, step: &Step) -> String {
 }
 
 fn undo(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-    let key = &snapshot.instrument_key;
+    let key = snapshot.altered_key();
     let name = |step: Option<&Step>| step.map(|step| step_name(hands, step));
     let steps = [name(hands.history.undoable(key)), name(hands.history.redoable(key))];
     let arrows = [(Icon::Undo, "Undo"), (Icon::Redo, "Redo")];

@@ -32,6 +32,8 @@ pub struct Snapshot {
     pub as_built: Arc<InstrumentFile>,
     /// What names this instrument in a saved project.
     pub instrument_key: String,
+    /// Whether it can be altered: not while another one comes.
+    pub can_alter: bool,
     /// What the user has altered, in lengths of the file.
     pub alterations: Arc<Alterations>,
     /// Where the altered instrument was saved, or why it was not.
@@ -116,8 +118,10 @@ pub struct Snapshot {
 pub struct Connections {
     /// The sound output.
     pub sound: String,
-    /// The MIDI inputs that play.
+    /// The MIDI inputs that play, and what to say where there is none.
     pub midi: Vec<String>,
+    /// See [`midi`](Self::midi).
+    pub no_midi: String,
     /// How the user chooses others.
     pub how: String,
 }
@@ -125,10 +129,7 @@ pub struct Connections {
 impl Connections {
     /// The MIDI inputs on one line.
     pub fn midi_line(&self) -> String {
-        match self.midi.is_empty() {
-            true => "none; a keyboard plays as soon as you plug it in".to_owned(),
-            false => self.midi.join(", "),
-        }
+        if self.midi.is_empty() { self.no_midi.clone() } else { self.midi.join(", ") }
     }
 }
 
@@ -140,6 +141,7 @@ impl Default for Snapshot {
             as_built: instrument.clone(),
             instrument,
             instrument_key: String::new(),
+            can_alter: true,
             alterations: Arc::default(),
             saved: None,
             key_pitches: KeyPitches::default(),
@@ -183,6 +185,11 @@ impl Default for Snapshot {
 }
 
 impl Snapshot {
+    /// What names the instrument whose moved holes can be undone and redone now.
+    pub fn altered_key(&self) -> Option<&str> {
+        self.can_alter.then_some(&*self.instrument_key)
+    }
+
     /// The settings with the reed as the lip has it now.
     pub fn played(&self) -> Settings {
         self.settings.under_lip(self.lip)

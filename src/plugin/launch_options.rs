@@ -1,7 +1,8 @@
 //! What the standalone program tells the plugin that it runs.
 //!
 //! The framework constructs the plugin by itself and passes nothing to it. These options are therefore the one global of
-//! the plugin. The standalone sets them once, before it starts the framework. In a host nobody sets them.
+//! the plugin. The standalone sets them once, before it starts the framework, and tells of its connections while it plays. In a host
+//! nobody sets them.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, OnceLock, PoisonError};

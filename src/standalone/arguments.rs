@@ -236,9 +236,16 @@ impl Args {
                 )
             }
         };
-        // Without a backend, no MIDI input is opened.
-        let midi = if backend == Backend::Dummy { vec!["none".to_owned()] } else { Vec::new() };
-        Connections { sound, midi, how: how.to_owned() }
+        let no_midi = match (backend, &self.midi_input, &self.connect_jack_midi_input) {
+            // Without a backend, no MIDI input is opened.
+            (Backend::Dummy, ..) => "none".to_owned(),
+            (_, Some(name), _) if !name.is_empty() => format!("none named {name}"),
+            (Backend::Auto | Backend::Jack, _, Some(port)) => {
+                format!("none; the JACK port {port} is not there")
+            }
+            _ => "none; a keyboard plays as soon as you plug it in".to_owned(),
+        };
+        Connections { sound, midi: Vec::new(), no_midi, how: how.to_owned() }
     }
 
     /// The JACK ports to connect to.

@@ -626,6 +626,7 @@ fn a_program_without_a_host_says_where_its_sound_and_midi_are() {
     window.snapshot.borrow_mut().connections = Some(Connections {
         sound: "JACK, 48000 Hz: system:playback_1".to_owned(),
         midi: Vec::new(),
+        no_midi: "none; a keyboard plays as soon as you plug it in".to_owned(),
         how: "A patchbay connects others.".to_owned(),
     });
     window.harness.run();

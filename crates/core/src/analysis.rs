@@ -1,7 +1,7 @@
 //! Measurements of sound: pitch, spectrum, onset, and the impedance behind a reflectance.
 //!
-//! Pure functions of slices of f64 samples (full scale 1.0) at a rate in Hz. A rate or a pitch that is not above 0, or is none, has no
-//! result: `None`, or nothing. They allocate and take milliseconds: for
+//! Pure functions of slices of f64 samples (full scale 1.0) at a rate in Hz. A rate or a pitch that is not a number above 0 and up to
+//! 1 GHz has no result: `None`, or nothing. They allocate and take milliseconds: for
 //! renders, tests and plots, never for the audio thread.
 //!
 //! ```

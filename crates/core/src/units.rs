@@ -70,7 +70,7 @@ impl Default for Air {
     }
 }
 
-/// Widest range of the pitch of A4 that theory is asked for, Hz. What sounds is made for a narrower one,
+/// Range of A4 that calculations without sound accept, Hz. What sounds is made for a narrower one,
 /// [`A4_RANGE_HZ`](crate::instrument::concert_pitch::A4_RANGE_HZ).
 pub const A4_OF_THEORY_HZ: (f64, f64) = (100.0, 1_000.0);
 

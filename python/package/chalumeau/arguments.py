@@ -252,7 +252,7 @@ _OF_SOUND = ("no_noise", "tempered", "natural", "quality", "untuned")
 def is_only_of_render(name: str) -> bool:
     """Whether a name is an argument of `render` and no setting of the sound."""
     spelt = name.replace("-", "_")
-    if spelt in _OF_SOUND or spelt.startswith("reed_") or setting_id(name) in {each["id"] for each in parameters()}:
+    if spelt in _OF_SOUND or spelt.startswith("reed_") or setting_id(name) in _ids().values():
         return False
     return spelt in ("score", "channels") or is_of_render(name)
 

@@ -162,7 +162,7 @@ def _refuse_another_cut(cut: Sequence[Part], into: str | os.PathLike[str], rows_
     """Refuses to go on with other ``rows_per_part`` than the folder was begun with: all would be rendered again, beside the old files."""
     _, parquet = load_parquet()
     ours, begun_with, is_another = {part.file: len(part.rows) for part in cut}, 0, False
-    for path in Path(into).glob(f"{PARQUET}/*.parquet"):
+    for path in Path(into).glob(f"{PARQUET}/part-*.parquet"):
         try:
             rows_there = parquet.read_metadata(path).num_rows
         except (OSError, ValueError):

@@ -112,7 +112,7 @@ impl BreathArgs {
     }
 }
 
-/// Why a file cannot be read; what has not the name of a file may be meant as something else.
+/// Why a file cannot be read. A text without an extension was perhaps not meant as a file.
 fn no_such_breath(path: PathBuf, source: io::Error) -> Failure {
     if source.kind() == io::ErrorKind::NotFound && path.extension().is_none() {
         return Failure::Usage(format!(

@@ -246,16 +246,16 @@ impl NiceEguiApp for EditorApp {
         snapshot.trims = params.scale.trims();
         snapshot.follows_tuning_program = params.scale.follows_tuning_program();
         // While another instrument comes, the window still draws the old one, which cannot be altered any more.
-        let is_shown = snapshot.instrument_key == params.instrument.key();
-        snapshot.alterations =
-            if is_shown { params.alterations.of(&snapshot.instrument_key) } else { Arc::default() };
+        snapshot.can_alter = snapshot.instrument_key == params.instrument.key();
+        snapshot.alterations = match snapshot.can_alter {
+            true => params.alterations.of(&snapshot.instrument_key),
+            false => Arc::default(),
+        };
         snapshot.room = room;
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {
-            if is_shown || !matches!(action, Action::Alter(_)) {
-                memory.act(action, &self.shared, &self.gui);
-            }
+            memory.act(action, &self.shared, &self.gui);
         }
         let links = changes(&params);
         if std::mem::replace(&mut memory.links, links) != links {

@@ -27,8 +27,10 @@ const BEGINNING: Duration = Duration::from_secs(2);
 /// How long the program waits for the client to close when it ends.
 const CLOSING: Duration = Duration::from_millis(800);
 
-const GONE: &str = "the JACK server has ended; no sound until it runs again (Ctrl-C quits)";
-const STALLED: &str = "the JACK server does not call; no sound until it does (Ctrl-C quits)";
+const GONE: &str = "the JACK server has ended; no sound until it runs again";
+const STALLED: &str = "the JACK server does not call; no sound until it does";
+/// On the terminal, after the two.
+const QUIT: &str = "(Ctrl-C quits)";
 const BACK: &str = "the JACK server is back; playing";
 
 /// An opened client on its way from `main` to the plugin, which the framework makes by itself.
@@ -117,7 +119,7 @@ impl JackLink {
         let is_running = thread.is_ok();
         // A program that says that it plays shall do so. A server that hangs is said here: the thread waits for it.
         if told.recv_timeout(BEGINNING) == Err(RecvTimeoutError::Timeout) {
-            eprintln!("chalumeau-standalone: {STALLED}");
+            eprintln!("chalumeau-standalone: {STALLED} {QUIT}");
         }
         *self.thread.lock().unwrap_or_else(PoisonError::into_inner) = thread.ok();
         is_running
@@ -244,7 +246,7 @@ impl LinkThread {
             Health::Stalls => {
                 if !std::mem::replace(&mut self.stalls, true) {
                     self.forget();
-                    self.say(STALLED);
+                    self.say(&format!("{STALLED} {QUIT}"));
                     LaunchOptions::connect(|now| now.sound = STALLED.to_owned());
                 }
             }
@@ -253,8 +255,10 @@ impl LinkThread {
                 self.forget();
                 // Those of the next server are new.
                 self.keyboards.as_mut().map(HashSet::clear);
-                self.say(GONE);
-                LaunchOptions::connect(|now| (now.sound, now.midi) = (GONE.to_owned(), Vec::new()));
+                self.say(&format!("{GONE} {QUIT}"));
+                LaunchOptions::connect(|now| {
+                    (now.sound, now.midi) = (GONE.to_owned(), vec!["none".to_owned()])
+                });
                 self.keep_connections();
                 return None;
             }

@@ -5,7 +5,9 @@
 //! are moved until the transfer-matrix model, with the reed's volume at the tip, sounds (phase of the impedance through
 //! zero) at every note. A vent can be added a third of the way down for the twelfths, which are as true as a cylinder's.
 
-use crate::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, MAX_HOLES, ToneHole};
+use crate::bore::instrument_file::{
+    BoreSegment, Fingering, HoleKind, InstrumentFile, LONGEST_M, MAX_HOLES, ToneHole,
+};
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::units::{A4_OF_THEORY_HZ, Air, WrittenNote, cents};
 
@@ -67,6 +69,17 @@ pub enum CylinderError {
     /// A size that no instrument file can have, in the words of [`InstrumentFile::check`].
     #[error("{0}")]
     Size(String),
+    /// A note that needs a longer bore than an instrument file can have.
+    #[error(
+        "{lowest} needs a bore {length_mm:.0} mm long, and the longest of an instrument file is {most:.0} mm; begin with a higher note",
+        most = 1e3 * LONGEST_M
+    )]
+    TooLong {
+        /// The lowest note.
+        lowest: WrittenNote,
+        /// Its bore, mm.
+        length_mm: f64,
+    },
     /// Holes wider than the bore.
     #[error("holes of {hole_mm} mm are wider than a bore of {bore_mm} mm")]
     TooWide {
@@ -113,6 +126,9 @@ fn name_of_hole(index: usize) -> String {
 
 impl Cylinder {
     /// The instrument. Allocates; some tenths of a second.
+    ///
+    /// # Errors
+    /// [`CylinderError`] says which size or note cannot be, and what to change.
     pub fn build(&self, air: Air) -> Result<InstrumentFile, CylinderError> {
         self.possible()?;
         let wanted: Vec<f64> = self
@@ -161,6 +177,10 @@ impl Cylinder {
         if self.vent_radius_m.is_some() {
             self.add_twelfths(&mut file);
         }
+        if file.length_m() > LONGEST_M {
+            return Err(CylinderError::TooLong { lowest: self.notes[0], length_mm: 1e3 * file.length_m() });
+        }
+        file.check().map_err(|error| CylinderError::Size(error.to_string()))?;
         Ok(file)
     }
 
@@ -344,9 +364,9 @@ mod tests {
         for size in [0.0, -1e-3, f64::NAN, f64::INFINITY] {
             for wrong in [
                 Cylinder { radius_m: size, hole_radius_m: size, ..cylinder(&[50, 52]) },
-                Cylinder { hole_radius_m: size.min(1e-9), ..cylinder(&[50, 52]) },
+                Cylinder { hole_radius_m: if size > 0.0 { 1e-9 } else { size }, ..cylinder(&[50, 52]) },
                 Cylinder { chimney_m: size, ..cylinder(&[50, 52]) },
-                Cylinder { vent_radius_m: Some(size.min(1e-9)), ..cylinder(&[50, 52]) },
+                Cylinder { vent_radius_m: Some(if size > 0.0 { 1e-9 } else { size }), ..cylinder(&[50, 52]) },
             ] {
                 let said = message(wrong);
                 assert!(said.contains("it must be"), "{size}: {said}");

@@ -23,7 +23,7 @@ mod words;
 pub use csv::{ImportDetails, ImportError, Sheet};
 pub use error::InstrumentError;
 use limits::*;
-pub use limits::{HOLE_RADIUS_M, LEAST_HOLE_X_M, MAX_HOLES, MAX_SEGMENTS};
+pub use limits::{HOLE_RADIUS_M, LEAST_HOLE_X_M, LONGEST_M, MAX_HOLES, MAX_SEGMENTS};
 use raw::{Lined, RawFile, RawFingering, RawHole, RawSegment};
 use words::{Place, Word, Words};
 

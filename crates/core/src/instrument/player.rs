@@ -312,12 +312,8 @@ impl Player {
         self.keys.press(note);
         self.breath.set_velocity(velocity);
         if !slurred {
-            self.prepare();
+            self.prepare(fingering, model);
             self.swaying.swing.begin_note();
-            let place = model.place(fingering);
-            let high = attack::lip_help(place, model.notes_hz[fingering]);
-            let ringing = || retongued::lip_help(self.ear.amplitude(), place);
-            self.lip_glide.help(high.or_else(ringing));
         }
         self.finger(fingering, slurred, model, voice);
         let slap = self.settings.articulation.slap;
@@ -343,12 +339,15 @@ impl Player {
         }
     }
 
-    /// The tongue holds the reed before a note.
-    fn prepare(&mut self) {
+    /// The tongue holds the reed before a note, and the lip makes ready for it.
+    fn prepare(&mut self, fingering: usize, model: &Model) {
         let is_in_time =
             self.settings.breath_response == BreathResponse::Played && retongued::rings(self.ear.amplitude());
         self.tongue.hold(is_in_time);
         self.inflection.begin(&self.settings.articulation);
+        let place = model.place(fingering);
+        let high = attack::lip_help(place, model.notes_hz[fingering]);
+        self.lip_glide.help(high.or_else(|| retongued::lip_help(self.ear.amplitude(), place)));
     }
 
     /// Whether a choke of this note silences something: it sounds, or no key is down and it may fade.
@@ -365,7 +364,7 @@ impl Player {
         }
         match self.take_up_last(model) {
             Some(fingering) => {
-                self.prepare();
+                self.prepare(fingering, model);
                 self.finger(fingering, false, model, voice);
             }
             None => self.tongue.stop(),

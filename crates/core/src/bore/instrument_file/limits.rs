@@ -40,6 +40,8 @@ pub(super) const HOLE_POSITION: Range = range(1.0, 3_000.0, (20.0, 3_000.0), "")
 pub(super) const BORE_LENGTH: Range = range(20.0, 3_000.0, (100.0, 3_000.0), " for the last cone");
 pub(super) const BORE_DIAMETER: Range = range(1.0, 200.0, (4.0, 150.0), "");
 pub(super) const HOLE_DIAMETER: Range = range(0.2, 60.0, (1.0, 40.0), "");
+/// Longest bore of the format, m.
+pub const LONGEST_M: f64 = POSITION.most / 1e3;
 /// Least distance of a tone hole from the tip of the reed, m.
 pub const LEAST_HOLE_X_M: f64 = HOLE_POSITION.least / 1e3;
 /// Least and greatest radius of a tone hole, m.

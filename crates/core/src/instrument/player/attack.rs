@@ -37,7 +37,7 @@ const HARD: (f64, f64) = (0.2, 0.1);
 /// Hard: how much more quickly the tongue lets go.
 const HARD_RELEASE: f64 = 2.0;
 
-/// What the lip takes from the factor on the reed's damping while a note begins, from written E flat 6 on. With 0.4, G6 begins more than 5 dB louder than it
+/// What the lip takes from the factor on the reed's damping while a note begins: wholly from written E flat 6 on, nothing up to C6. With 0.4, G6 begins more than 5 dB louder than it
 /// goes on.
 const HIGH_FREEDOM: f64 = 0.35;
 /// For how long, periods of the note: 0.029 s on written E flat 6 of a B flat clarinet, and 0.017 s on C7.

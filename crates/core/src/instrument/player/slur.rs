@@ -36,8 +36,8 @@ const NARROW: (f64, f64) = (950.0, 0.5);
 /// arrive, with 1.5 and 1.75 some do not; the stronger, the deeper the hole (`docs/tone.md`). In 20 ms a slur from written B4 to B3 is 2.8 dB
 /// louder on the way at CC 58.
 const DAMPED: LipHelp = LipHelp { damping: 1.85, length_s: 0.025 };
-/// Leaps down into the low chalumeau over more than so many cents: more than an octave. Above it they arrive by themselves; with the lip's help
-/// they fall silent for 0.1 s.
+/// Leaps down into the low chalumeau over more than so many cents: more than an octave. Above it they arrive by themselves; with so much
+/// damping they fall silent for 0.1 s.
 const WIDE_CENTS: f64 = 1_250.0;
 /// What the lip adds to the factor on the reed's damping in these, into the lowest note. Of 612 from written B4..C6 into E3..D#4, at four values of CC 2,
 /// none is lost with it. With 2.5, three into E3 are lost at full breath; six times the damping on every note made holes of 25 dB in the median (`docs/tone.md`).
@@ -61,6 +61,11 @@ const THROAT_FREEDOM: f64 = 0.15;
 /// Mouth over closing pressures between which it ceases to. Loud notes grow soon by themselves, and a beating reed that swings freely squeaks: at CC 108 and
 /// 127 it makes bumps of 3 dB and clicks of 12.
 const THROAT_LOUD: (f64, f64) = (0.45, 0.6);
+/// What it adds to it where the lowest of these notes hold on to their second mode while the reed beats: wholly at [`LOW_PLACE`], and no more from the place
+/// of written G4 on. Without it written E4 stays on its twelfth for up to 0.6 s at full breath, with 0.8 holes are 5 dB deeper (`docs/tone.md`).
+const THROAT_DAMPING: f64 = 0.5;
+/// See [`THROAT_DAMPING`].
+const THROAT_HOLDS: f64 = -0.27;
 /// Factor on the legato time in these. Measured with this lip, at 2.9, 3.5 and 4: nine tenths of the holes are 12.8, 11.3 and 10.3 dB deep.
 const THROAT_TIME: f64 = 4.0;
 /// What the lip does up into the altissimo. Of 208 slurs from C5..C6 to F#6..A6, nine tenths have arrived after 235 ms without it, 175 with
@@ -139,6 +144,15 @@ impl Slur {
         LipHelp { damping: 1.0 + WIDE_DAMPING / (ratio * ratio.sqrt()), length_s: PERIODS / self.note_hz }
     }
 
+    /// What it does down into the throat at a mouth over closing pressure.
+    fn throat_help(&self, gamma: f64) -> LipHelp {
+        let (soft, loud) = THROAT_LOUD;
+        let loudness = ((gamma - soft) / (loud - soft)).clamp(0.0, 1.0);
+        let holds = ((THROAT_HOLDS - self.place) / (THROAT_HOLDS - LOW_PLACE)).clamp(0.0, 1.0);
+        let damping = 1.0 - THROAT_FREEDOM * (1.0 - loudness) + THROAT_DAMPING * loudness * holds;
+        LipHelp { damping, length_s: PERIODS / self.note_hz }
+    }
+
     /// Whether both notes lie in one register, so that the air column goes on as it swings.
     pub fn is_within_a_register(&self) -> bool {
         self.registers.0 == self.registers.1
@@ -150,10 +164,7 @@ impl Slur {
             return Some(self.wide_help());
         }
         if self.is_into_the_throat() {
-            let (soft, loud) = THROAT_LOUD;
-            let softness = ((loud - gamma) / (loud - soft)).clamp(0.0, 1.0);
-            let damping = 1.0 - THROAT_FREEDOM * softness;
-            return Some(LipHelp { damping, length_s: PERIODS / self.note_hz });
+            return Some(self.throat_help(gamma));
         }
         match self.registers {
             (3, 2) => Some(FROM_ALTISSIMO_DAMPED),
