@@ -662,7 +662,7 @@ fn control_and_z_undo_in_a_window_without_a_host() {
 #[test]
 fn the_play_view_says_which_instrument_is_loaded() {
     let mut window = Window::new(Tab::Play, (700.0, 480.0));
-    window.harness.get_by_label("B flat clarinet, Boehm system, 67 cm long");
+    window.harness.get_by_label("B flat clarinet, Boehm system, in B flat, 67 cm long");
     window.snapshot.borrow_mut().instrument = Bundled::Bass.file().into();
     window.harness.run();
     window.harness.get_by_label("B flat bass clarinet, Boehm system, 134 cm long");

@@ -244,8 +244,13 @@ mod tests {
                 lower.damping > lip.damping && lower.length_s > lip.length_s
             }));
             let into_the_throat = slur(-13.0, registers, -0.4);
-            assert!(into_the_throat.lip_help(0.5).is_some_and(|lip| lip.damping < 1.0));
-            assert!(into_the_throat.lip_help(0.9).is_some_and(|lip| lip.damping == 1.0));
+            assert!(into_the_throat.lip_help(0.4).is_some_and(|lip| lip.damping < 1.0));
+            assert!(
+                into_the_throat.lip_help(0.9).is_some_and(|lip| lip.damping > 1.0),
+                "it holds on to the old mode"
+            );
+            let higher = slur(-13.0, registers, -0.2).lip_help(0.9);
+            assert!(higher.is_some_and(|lip| lip.damping == 1.0));
             assert!(!into_the_throat.walk(0.9).mouth_first && into_the_throat.walk(0.9).time == THROAT_TIME);
         }
     }
