@@ -665,7 +665,7 @@ fn the_play_view_says_which_instrument_is_loaded() {
     window.harness.get_by_label("B flat clarinet, Boehm system, in B flat, 67 cm long");
     window.snapshot.borrow_mut().instrument = Bundled::Bass.file().into();
     window.harness.run();
-    window.harness.get_by_label("B flat bass clarinet, Boehm system, 134 cm long");
+    window.harness.get_by_label("B flat bass clarinet, Boehm system, in B flat, 134 cm long");
 }
 
 #[test]
