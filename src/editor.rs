@@ -326,7 +326,6 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     }
     breath.look(&snapshot.sources, ui.input(|input| input.time));
     trial.keep_to(snapshot, &mut actions);
-    clarinet.name_trial(kept.names, snapshot, trial);
     // A window that has grown past the screen hides the list of sizes.
     if keyboard.has_letters()
         && ui.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Num0))
@@ -374,7 +373,11 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         // Pressures are for a laboratory, and for who has chosen to blow them.
         let is_pressure = kept.is_lab || snapshot.settings.breath_response == BreathResponse::Physical;
         line.frame(ground(8, 8)).show(ui, |ui| {
-            if is_pressure { breath_meter::column(ui, snapshot) } else { dynamic_meter::draw(ui, snapshot) }
+            if is_pressure {
+                breath_meter::column(ui, snapshot)
+            } else {
+                dynamic_meter::draw(ui, snapshot, 1.0)
+            }
         });
     }
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
@@ -391,7 +394,10 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             return;
         }
         match tab {
-            Tab::Play => play.draw(ui, &mut hands, snapshot, trial, clarinet.alterations(), &mut actions),
+            Tab::Play => {
+                let tried = clarinet.tried_name(kept.names, snapshot, trial);
+                play.draw(ui, &mut hands, snapshot, (trial, tried), clarinet.alterations(), &mut actions);
+            }
             Tab::Reed => reed.draw(ui, &mut hands, snapshot),
             Tab::Clarinet => clarinet.draw(ui, kept.names, snapshot, trial, &mut actions),
             Tab::Breath => breath.draw(ui, &mut hands, snapshot),

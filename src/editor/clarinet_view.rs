@@ -51,13 +51,13 @@ impl ClarinetView {
         &mut self.alterations
     }
 
-    /// Names the fingering of a trial, in every view.
-    pub fn name_trial(&mut self, names: NoteNames, snapshot: &Snapshot, trial: &mut Trial) {
-        let Some(tried) = trial.open() else { return };
+    /// What is tried, for example "D4", or "your own fingering".
+    pub fn tried_name(&mut self, names: NoteNames, snapshot: &Snapshot, trial: &Trial) -> Option<String> {
+        let tried = trial.open()?;
         let all = self.choices(&snapshot.instrument);
         let choice = all.iter().find(|choice| choice.open == tried);
         let name = choice.map(|choice| choice_name(choice, names, snapshot.instrument.transposition));
-        trial.set_name(name.unwrap_or_else(|| OWN.to_owned()));
+        Some(name.unwrap_or_else(|| OWN.to_owned()))
     }
 
     /// Draws the view.

@@ -8,12 +8,10 @@ use egui::{
 use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::snapshot::{NO_BREATH_KPA, Snapshot};
+use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::instrument::BreathResponse;
 use chalumeau_core::instrument::player::dynamics::NAMED;
-
-/// Widest place beside a view in a window of the usual size, points.
-const USUAL_WIDTH: f32 = 112.0;
 
 /// Part of the column below the threshold.
 const BELOW: f32 = 0.07;
@@ -37,7 +35,7 @@ struct Reading {
 }
 
 /// Draws the meter into all of the place.
-pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
+pub fn draw(ui: &mut Ui, snapshot: &Snapshot, grown: f32) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     let reading = match (snapshot.settings.breath_response, snapshot.dynamic) {
@@ -45,10 +43,8 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
         (BreathResponse::Physical, _) => physical(snapshot, c),
     };
     let painter = ui.painter();
-    // A wide place is one in a large window.
-    let grown = (rect.width() / USUAL_WIDTH).max(1.0);
     let width = if rect.width() > 96.0 { 34.0 * grown } else { 26.0 };
-    let small = FontId::proportional(12.0 * grown);
+    let small = theme::small_grown(grown);
     let column = Rect::from_min_max(
         pos2(rect.left() + 12.0, rect.top() + 12.0),
         pos2(rect.left() + 12.0 + width, rect.bottom() - 34.0 * grown),

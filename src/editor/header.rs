@@ -243,17 +243,15 @@ fn undo(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<A
     let key = snapshot.altered_key();
     let name = |step: Option<&Step>| step.map(|step| step_name(hands, step));
     let steps = [name(hands.history.undoable(key)), name(hands.history.redoable(key))];
+    let go: [fn(&mut Hands, &Snapshot, &mut Vec<Action>); 2] = [undo_step, redo_step];
     let arrows = [(Icon::Undo, "Undo"), (Icon::Redo, "Redo")];
-    for ((symbol, word), step) in arrows.into_iter().zip(steps) {
+    for (((symbol, word), step), go) in arrows.into_iter().zip(steps).zip(go) {
         ui.add_enabled_ui(step.is_some(), |ui| {
-            let response = icon(ui, symbol, word);
-            let response = response
+            let response = icon(ui, symbol, word)
                 .on_hover_text(format!("{word} {}", step.unwrap_or_default()))
                 .on_disabled_hover_text(format!("{word}: settings, presets, moved holes and joints"));
-            match symbol {
-                _ if !response.clicked() => {}
-                Icon::Redo => redo_step(hands, snapshot, actions),
-                _ => undo_step(hands, snapshot, actions),
+            if response.clicked() {
+                go(hands, snapshot, actions);
             }
         });
     }

@@ -7,8 +7,8 @@ mod switch_row;
 mod typed_letters;
 
 use egui::{
-    Align2, Color32, CornerRadius, Event, EventFilter, FontId, Key, Pos2, Rect, Role, Sense, Stroke, Ui,
-    WidgetInfo, pos2, vec2,
+    Align2, Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo,
+    pos2, vec2,
 };
 
 use crate::editor::Action;
@@ -298,7 +298,7 @@ impl Keys {
         }
         let is_low = self.rect.height() < ROOM_FOR_BOTH;
         let grown = (self.white / USUAL_WHITE).clamp(1.0, MOST_GROWN);
-        let font = FontId::proportional(12.0 * grown);
+        let font = theme::small_grown(grown);
         let letter = |note: u8| letter(note).filter(|_| named(note).is_some());
         for note in self.from..=self.to {
             let (key, is_down) = (self.key(note), down.contains(&Some(note)));

@@ -55,13 +55,13 @@ pub struct PlayView {
 }
 
 impl PlayView {
-    /// Draws the view.
+    /// Draws the view. `tried`: what the trial tries, if there is one.
     pub fn draw(
         &mut self,
         ui: &mut Ui,
         hands: &mut Hands,
         snapshot: &Snapshot,
-        trial: &mut Trial,
+        (trial, tried): (&mut Trial, Option<String>),
         alterations: &mut AlterationEditor,
         actions: &mut Vec<Action>,
     ) {
@@ -96,7 +96,7 @@ impl PlayView {
         let side = Panel::left("dynamics")
             .exact_size(if is_small { 84.0 } else { 108.0 * grown })
             .show_separator_line(false);
-        side.frame(clear).show(ui, |ui| dynamic_meter::draw(ui, snapshot));
+        side.frame(clear).show(ui, |ui| dynamic_meter::draw(ui, snapshot, grown));
         egui::CentralPanel::default().frame(clear).show(ui, |ui| {
             let rect = ui.available_rect_before_wrap();
             stage::ground(ui, rect);
@@ -123,7 +123,10 @@ impl PlayView {
                     rect.center_bottom() - vec2(0.0, 21.0),
                     vec2(rect.width() - 16.0, 26.0),
                 );
-                back_to_the_note(ui, row, snapshot, trial, actions);
+                // A trial that this click has begun is named in the next frame.
+                if let Some(tried) = &tried {
+                    back_to_the_note(ui, row, snapshot, (trial, tried), actions);
+                }
             } else if snapshot.sounding.is_none() {
                 let at = rect.center_bottom() - vec2(0.0, 10.0);
                 let text = "Play a key below, or blow. Click a hole to try it, drag it to move it.";
@@ -139,13 +142,13 @@ fn back_to_the_note(
     ui: &mut Ui,
     row: Rect,
     snapshot: &Snapshot,
-    trial: &mut Trial,
+    (trial, tried): (&mut Trial, &str),
     actions: &mut Vec<Action>,
 ) {
     const BUTTON: f32 = 150.0;
     let c = Colours::here(ui);
     let hint = if snapshot.sounding.is_none() { ": play a key to hear it" } else { "" };
-    let told = format!("Trying {}{hint}", trial.name());
+    let told = format!("Trying {tried}{hint}");
     let words = one_line(ui, &told, theme::body(), c.ink, row.width() - BUTTON - 12.0);
     let left = row.center().x - 0.5 * (words.size().x + 12.0 + BUTTON);
     let place = Rect::from_min_size(pos2(left, row.center().y - 0.5 * words.size().y), words.size());

@@ -174,7 +174,12 @@ pub fn body() -> FontId {
 
 /// Names of axes, marks and units.
 pub fn small() -> FontId {
-    FontId::proportional(12.0)
+    small_grown(1.0)
+}
+
+/// The same in a view whose words are `grown` times as large as in a window of the usual size.
+pub fn small_grown(grown: f32) -> FontId {
+    FontId::proportional(12.0 * grown)
 }
 
 /// Headings inside a view.

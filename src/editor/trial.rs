@@ -7,7 +7,6 @@ use crate::editor::snapshot::Snapshot;
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
     open: Option<Vec<bool>>,
-    name: String,
 }
 
 impl Trial {
@@ -19,16 +18,6 @@ impl Trial {
     /// Whether there is one.
     pub fn is_on(&self) -> bool {
         self.open.is_some()
-    }
-
-    /// What is tried, for example "D4", or "your own fingering"; empty until it has been named.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Names what is tried.
-    pub fn set_name(&mut self, name: String) {
-        self.name = name;
     }
 
     /// Tries these holes.

@@ -70,6 +70,15 @@ impl Default for Air {
     }
 }
 
+/// Lowest and highest host rate, Hz: the widest range that a validator of plugins was seen to ask for. A low rate cannot
+/// carry high notes.
+pub const HOST_RATES_HZ: (f64, f64) = (1_000.0, 1_536_000.0);
+
+/// The rate that is taken where none can be: the nearest within [`HOST_RATES_HZ`], and 48 kHz for NaN, Hz.
+pub(crate) fn nearest_rate_hz(host_rate_hz: f64) -> f64 {
+    if host_rate_hz.is_nan() { 48_000.0 } else { host_rate_hz.clamp(HOST_RATES_HZ.0, HOST_RATES_HZ.1) }
+}
+
 /// Range of A4 that calculations without sound accept, Hz. What sounds is made for a narrower one,
 /// [`A4_RANGE_HZ`](crate::instrument::concert_pitch::A4_RANGE_HZ).
 pub const A4_OF_THEORY_HZ: (f64, f64) = (100.0, 1_000.0);

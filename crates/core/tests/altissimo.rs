@@ -40,6 +40,11 @@ struct Heard {
     begins_s: f64,
 }
 
+fn prepared(instrument: Bundled, rate_hz: f64) -> Arc<Model> {
+    let wanted = Wanted::new(instrument.file(), rate_hz);
+    Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap())
+}
+
 fn heard(model: &Arc<Model>, rate_hz: f64, written: u8, breath: f32) -> Heard {
     let note = WrittenNote(written).sounding(model.file.transposition).unwrap();
     let wanted_hz = note.frequency_hz(440.0);
@@ -62,8 +67,7 @@ fn heard(model: &Arc<Model>, rate_hz: f64, written: u8, breath: f32) -> Heard {
 fn worst(instrument: Bundled) -> (f64, f64) {
     let mut all = Vec::new();
     for rate_hz in [44_100.0, 48_000.0] {
-        let wanted = Wanted::new(instrument.file(), rate_hz);
-        let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
+        let model = prepared(instrument, rate_hz);
         let cases: Vec<(u8, f32)> =
             NOTES.into_iter().flat_map(|written| BREATHS.map(|breath| (written, breath))).collect();
         let play = |at: usize| heard(&model, rate_hz, cases[at].0, cases[at].1);
@@ -113,8 +117,7 @@ fn level_db(sound: &[f64]) -> f64 {
 #[test]
 fn the_highest_notes_are_as_loud_as_their_neighbours() {
     for instrument in Bundled::ALL {
-        let wanted = Wanted::new(instrument.file(), RATE_HZ);
-        let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
+        let model = prepared(instrument, RATE_HZ);
         let levels = |controller: u8| {
             let level = |at: usize| {
                 level_db(
@@ -141,8 +144,7 @@ fn the_highest_notes_are_as_loud_as_their_neighbours() {
 fn slurs_to_and_from_the_highest_notes_arrive() {
     let samples = |s: f64| (s * RATE_HZ) as usize;
     for instrument in [Bundled::BFlat, Bundled::Bass] {
-        let wanted = Wanted::new(instrument.file(), RATE_HZ);
-        let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
+        let model = prepared(instrument, RATE_HZ);
         let up = (69..=84).step_by(3).flat_map(|from| (87..=96).map(move |to| (from, to)));
         let down = (83..=88).flat_map(|from| (64..=72).map(move |to| (from, to)));
         let cases: Vec<(u8, u8, u8)> = up
@@ -196,8 +198,7 @@ fn arrival_s(model: &Arc<Model>, (from, to, controller): (u8, u8, u8)) -> f64 {
 #[test]
 fn slurs_from_and_into_the_altissimo_arrive_soon() {
     for instrument in [Bundled::BFlat, Bundled::Bass] {
-        let wanted = Wanted::new(instrument.file(), RATE_HZ);
-        let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
+        let model = prepared(instrument, RATE_HZ);
         let pairs = |from: std::ops::RangeInclusive<u8>, to: std::ops::RangeInclusive<u8>| {
             from.flat_map(move |from| to.clone().map(move |to| (from, to))).filter(|(from, to)| from != to)
         };
@@ -244,8 +245,7 @@ fn tongued(model: &Arc<Model>, written: u8, controller: u8) -> (f64, f64) {
 #[test]
 fn tongued_high_notes_speak_at_every_breath_and_without_an_accent() {
     for instrument in [Bundled::BFlat, Bundled::Bass] {
-        let wanted = Wanted::new(instrument.file(), RATE_HZ);
-        let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
+        let model = prepared(instrument, RATE_HZ);
         let cases: Vec<(u8, u8)> = (85..=96)
             .flat_map(|written| (4..=124).step_by(8).map(move |controller| (written, controller)))
             .collect();
@@ -302,8 +302,7 @@ fn grunt_ms(model: &Arc<Model>, written: u8, controller: u8) -> f64 {
 #[test]
 fn soft_high_notes_soon_outgrow_the_low_modes() {
     for (instrument, half_ms, tenth_ms) in [(Bundled::BFlat, 10.0, 30.0), (Bundled::Bass, 20.0, 50.0)] {
-        let wanted = Wanted::new(instrument.file(), RATE_HZ);
-        let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
+        let model = prepared(instrument, RATE_HZ);
         let cases: Vec<(u8, u8)> = (86..=96)
             .flat_map(|written| (4..=44).step_by(8).map(move |controller| (written, controller)))
             .collect();

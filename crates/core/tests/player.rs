@@ -6,7 +6,7 @@
 mod support;
 
 use chalumeau_core::analysis::onset::t90_s;
-use chalumeau_core::analysis::partials::{Partial, Wander};
+use chalumeau_core::analysis::partials::{HOP_S, Partial, Wander};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::moving_rms;
 use chalumeau_core::event::Event;
@@ -474,20 +474,14 @@ fn slurs_down_over_the_break_keep_sounding() {
 /// How long after the key the fundamental of a slurred note stays more than 6 dB under its final level, ms.
 fn fundamental_ms(from: u8, to: u8, value: u8) -> f64 {
     const AT: f64 = 0.5;
-    const WINDOW_S: f64 = 0.04;
     let out = rendered(&still(), &[controller(value), key(0.0, from), key(AT, to)], 1.6);
-    let level = |s: f64| {
-        let samples = &out[sample(s)..sample(s + WINDOW_S)];
-        let turn = std::f64::consts::TAU * hz(to) / RATE_HZ;
-        let window = |n: usize| 0.5 - 0.5 * (std::f64::consts::TAU * n as f64 / samples.len() as f64).cos();
-        let part = |of: fn(f64) -> f64| {
-            samples.iter().enumerate().map(|(n, x)| x * window(n) * of(turn * n as f64)).sum::<f64>()
-        };
-        db(part(f64::cos).hypot(part(f64::sin)) / samples.len() as f64)
-    };
-    let final_db = level(1.5);
-    let late = (0..180).map(|n| AT + 0.005 * f64::from(n)).rfind(|&s| level(s) < final_db - 6.0);
-    late.map_or(0.0, |s| 1e3 * (s + 0.5 * WINDOW_S - AT))
+    let fundamental = Partial::watch(&out[sample(AT)..], RATE_HZ, hz(to), 1);
+    let levels_db: Vec<f64> = fundamental.level_db().collect();
+    let final_db = levels_db[levels_db.len() - 1];
+    // A window is of the time of its middle.
+    let half_s = 0.5 * (1.1 - HOP_S * (levels_db.len() - 1) as f64);
+    let late = levels_db.iter().rposition(|&level_db| level_db < final_db - 6.0);
+    late.map_or(0.0, |at| 1e3 * (HOP_S * at as f64 + half_s))
 }
 
 /// Where the reed beats, the twelfth of written E4 sounded first: at full breath for half a second.

@@ -10,6 +10,7 @@ use crate::editor::host_marks;
 use crate::editor::key_steps::KeySteps;
 use crate::editor::linked_controllers;
 use crate::editor::slider::moved_by_pointer;
+use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::editor::widgets::one_line;
 
@@ -42,14 +43,11 @@ const ROOM_FOR_ENDS: f32 = 110.0;
 /// Whether what the ends mean fits below every control of this size.
 pub fn ends_fit(ui: &Ui, all: &[&Macro], size: Vec2, grown: f32) -> bool {
     let fits = |of: &&Macro| {
-        let words = ui.painter().layout_no_wrap(of.ends.to_owned(), small(grown), Color32::WHITE);
+        let words =
+            ui.painter().layout_no_wrap(of.ends.to_owned(), theme::small_grown(grown), Color32::WHITE);
         words.size().x + 4.0 <= size.x
     };
     size.y >= ROOM_FOR_ENDS && all.iter().all(fits)
-}
-
-fn small(grown: f32) -> FontId {
-    FontId::proportional(12.0 * grown)
 }
 
 /// Draws a control into a place of this size, with words `grown` times as large as in a window of the usual size; `has_ends`: it
@@ -101,13 +99,19 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
         true => (text.as_str(), c.ink),
         false => (text.as_str(), c.quiet),
     };
-    let words = one_line(ui, words, small(grown), ink, size.x - 4.0);
+    let words = one_line(ui, words, theme::small_grown(grown), ink, size.x - 4.0);
     let at = pos2(centre.x - 0.5 * words.size().x, name.bottom() + 1.0);
     let bottom = at.y + words.size().y;
     painter.galley(at, words, ink);
     if has_ends {
         let at = pos2(centre.x, bottom + 1.0);
-        painter.text(at, Align2::CENTER_TOP, of.ends, small(grown), c.quiet.gamma_multiply(0.85));
+        painter.text(
+            at,
+            Align2::CENTER_TOP,
+            of.ends,
+            theme::small_grown(grown),
+            c.quiet.gamma_multiply(0.85),
+        );
     }
     response.widget_info(|| {
         let mut info = WidgetInfo::slider(ui.is_enabled(), f64::from(value), of.name);

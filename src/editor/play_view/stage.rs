@@ -19,6 +19,7 @@ use crate::editor::chart;
 use crate::editor::clarinet_view;
 use crate::editor::hole_names::{hole_title, is_thumb};
 use crate::editor::snapshot::Snapshot;
+use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 
@@ -248,7 +249,7 @@ impl<'a> Body<'a> {
         let ends = self.x(0.0)..=self.x(self.shape.length_m);
         painter.hline(ends, foot, Stroke::new(1.0, c.breath.gamma_multiply(0.3)));
         painter.add(Shape::line(wave.iter().map(point).collect(), Stroke::new(2.0, c.breath)));
-        let font = egui::FontId::proportional(12.0 * grown);
+        let font = theme::small_grown(grown);
         if room > 60.0 {
             let at = rect.left_top() + vec2(self.left - rect.left() + 2.0, 2.0);
             painter.text(at, egui::Align2::LEFT_TOP, "sound pressure in the bore", font, c.breath);

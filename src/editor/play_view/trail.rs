@@ -1,6 +1,6 @@
 //! The last ten seconds: pitch as a line, loudness as its thickness and light.
 
-use egui::{Align2, Color32, CornerRadius, FontId, Mesh, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Color32, CornerRadius, Mesh, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use crate::editor::chart;
 use crate::editor::snapshot::{Snapshot, Track};
@@ -50,7 +50,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, grown: f32) {
         rect.left_top() + vec2(10.0, 5.0),
         Align2::LEFT_TOP,
         text,
-        FontId::proportional(12.0 * grown),
+        theme::small_grown(grown),
         c.quiet,
     );
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, text));

@@ -6,6 +6,7 @@
 
 use crate::analysis::pitch::{LOWEST_HZ, TrackPoint, pitch_track_above, window_s};
 use crate::analysis::spectrum::power_spectrum_db;
+use crate::units::nearest_rate_hz;
 
 /// Highest frequency of the spectrogram, Hz: above it a clarinet has no strong partials.
 pub const HIGHEST_HZ: f64 = 6_000.0;
@@ -14,11 +15,6 @@ pub const HIGHEST_HZ: f64 = 6_000.0;
 const COLUMN_S: f64 = 0.08;
 /// Shortest distance between two looks at the pitch, s: a sixth of what one sees.
 const HOP_S: f64 = 0.01;
-
-/// Rates of a sound, Hz, as hosts have them: what lies outside would make windows of no sample, or of all memory.
-const RATES_HZ: (f64, f64) = (1_000.0, 1_536_000.0);
-/// What is no number counts as this rate, Hz.
-const USUAL_RATE_HZ: f64 = 48_000.0;
 
 /// Lowest and highest value of equal stretches of something that runs.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,7 +98,8 @@ impl Watcher {
     /// For a sound of `samples` samples in `columns` columns. A rate outside 1000..=1536000 Hz counts as the nearest that is inside, NaN as
     /// 48000 Hz. Allocates.
     pub fn new(samples: usize, rate_hz: f64, columns: usize) -> Self {
-        let rate_hz = if rate_hz.is_nan() { USUAL_RATE_HZ } else { rate_hz.clamp(RATES_HZ.0, RATES_HZ.1) };
+        // Others would make windows of no sample, or of all memory.
+        let rate_hz = nearest_rate_hz(rate_hz);
         let window = ((COLUMN_S * rate_hz) as usize).next_power_of_two();
         let row_hz = rate_hz / window as f64;
         let rows = ((HIGHEST_HZ.min(0.5 * rate_hz) / row_hz) as usize).min(window / 2) + 1;

@@ -3,12 +3,9 @@
 //! [`crate::instrument::feel_inputs::played_reed`] makes one from the settings of the instrument, with the player's rule for the
 //! lip.
 
-use crate::reed::law::ReedError;
+use crate::reed::law::{ReedError, ZETA_RANGE};
 use crate::reed::physical::P_REF_PA;
 use crate::reed::{Lip, ReedLaw};
-
-/// Range of the embouchure parameter zeta, that of [`Settings::zeta`](crate::instrument::Settings::zeta).
-const ZETAS: (f64, f64) = (0.05, 0.9);
 
 /// The reed as it is played. Sound and feel use the same one.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +30,11 @@ impl PlayedReed {
     /// # Errors
     /// [`ReedError::Zeta`] if it lies outside.
     pub fn quasi_static(zeta: f64) -> Result<Self, ReedError> {
-        if (ZETAS.0..=ZETAS.1).contains(&zeta) { Ok(Self::of_zeta(zeta)) } else { Err(ReedError::Zeta(zeta)) }
+        if (ZETA_RANGE.0..=ZETA_RANGE.1).contains(&zeta) {
+            Ok(Self::of_zeta(zeta))
+        } else {
+            Err(ReedError::Zeta(zeta))
+        }
     }
 
     /// The same with a zeta that is in its range.

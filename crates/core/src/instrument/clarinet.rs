@@ -13,7 +13,6 @@ use crate::dsp::resampler::Resampler;
 use crate::event::{Event, Timed};
 use crate::instrument::channels::Channels;
 use crate::instrument::choke::Choke;
-use crate::instrument::internal_rate::nearest_rate_hz;
 use crate::instrument::lip::embouchure;
 use crate::instrument::listening::Listening;
 use crate::instrument::model::{BuildError, Model};
@@ -28,6 +27,7 @@ use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::physical::ZETA_REFERENCE;
 use crate::reed::{MovingReed, ReedCoeffs};
+use crate::units::nearest_rate_hz;
 
 /// Samples up to this magnitude count as silence: -120 dBFS. A gain that raises them raises it as well: single precision may
 /// leave a bore ringing at -140 dBFS for ever.

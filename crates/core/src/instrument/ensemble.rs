@@ -21,7 +21,6 @@ use crate::dsp::limiter::Limiter;
 use crate::event::{Event, PartEvent, SettingNumber, Timed, To};
 use crate::instrument::channels::Channels;
 use crate::instrument::clarinet::{Clarinet, Progress};
-use crate::instrument::internal_rate::nearest_rate_hz;
 use crate::instrument::listening::ListeningMode;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::person::Person;
@@ -29,7 +28,7 @@ use crate::instrument::players::{MOST_PLAYERS, Players, Split};
 use crate::instrument::settings::Settings;
 use crate::instrument::stage::Chair;
 use crate::instrument::stereo::gains;
-use crate::units::clamped_or;
+use crate::units::{clamped_or, nearest_rate_hz};
 use section::Section;
 
 /// Samples of the host between two decisions whether a player sleeps.

@@ -1,15 +1,7 @@
 //! The rate at which the lattice runs, chosen from the host's rate.
 
 use crate::instrument::model::BuildError;
-
-/// Lowest and highest host rate, Hz: the widest range that a validator of plugins was seen to ask for. A low rate cannot
-/// carry high notes.
-pub const HOST_RATES_HZ: (f64, f64) = (1_000.0, 1_536_000.0);
-
-/// The host rate that is played where none can be: the nearest within [`HOST_RATES_HZ`], and 48 kHz for NaN. Hz.
-pub(super) fn nearest_rate_hz(host_rate_hz: f64) -> f64 {
-    if host_rate_hz.is_nan() { 48_000.0 } else { host_rate_hz.clamp(HOST_RATES_HZ.0, HOST_RATES_HZ.1) }
-}
+pub use crate::units::HOST_RATES_HZ;
 
 /// The lattice's rate for a host rate, both Hz: 88.2 kHz for the 44.1 kHz family, 96 kHz for all others.
 pub fn internal_rate_hz(host_rate_hz: f64) -> f64 {

@@ -13,7 +13,7 @@ use crate::instrument::reach::Reach;
 use crate::instrument::room::Room;
 use crate::instrument::techniques::{Techniques, Tract};
 use crate::reed::ReedLaw;
-use crate::reed::law::{H_INIT, K_INIT, coupled_k};
+use crate::reed::law::{H_INIT, K_INIT, ZETA_RANGE, coupled_k};
 use crate::reed::physical::{P_REF_PA, PhysicalReed, ZETA_REFERENCE};
 use crate::reed::strength;
 use crate::units::clamped_or;
@@ -369,7 +369,7 @@ impl Settings {
             attack: self.attack,
             strength: clamped_or(self.strength, 1.5, 5.0, d.strength),
             lip: clamped_or(self.lip, 0.6, 1.4, d.lip),
-            zeta: clamped_or(self.zeta, 0.05, 0.9, d.zeta),
+            zeta: clamped_or(self.zeta, ZETA_RANGE.0 as f32, ZETA_RANGE.1 as f32, d.zeta),
             damping: clamped_or(self.damping, 0.2, 2.0, d.damping),
             lay: clamped_or(self.lay, 0.0, 0.5, d.lay),
             reed_h: clamped_or(self.reed_h, 1.0, 5.0, d.reed_h),

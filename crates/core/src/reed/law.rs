@@ -41,6 +41,9 @@ pub struct ReedLaw {
     a: f64,
 }
 
+/// Range of the embouchure parameter zeta, the flow strength: from a reed that hardly speaks to one that hardly closes.
+pub const ZETA_RANGE: (f64, f64) = (0.05, 0.9);
+
 /// Why a law or a reed is refused: one of its numbers is out of range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ReedError {
@@ -54,7 +57,11 @@ pub enum ReedError {
     #[error("A (amplitude) must lie in 0..10, got {0}; the reference is 1")]
     A(f64),
     /// zeta outside its range.
-    #[error("zeta (flow strength) must lie in 0.05..0.9, got {0}; the reference is 0.3")]
+    #[error(
+        "zeta (flow strength) must lie in {low}..{high}, got {0}; the reference is 0.3",
+        low = ZETA_RANGE.0,
+        high = ZETA_RANGE.1
+    )]
     Zeta(f64),
 }
 

@@ -4,8 +4,9 @@
 //! dynamic, where there is hardly more than the fundamental. A hard one begins above it and eases off. A normal one is there
 //! at once: the air column alone makes its growth.
 //!
-//! What the tongue lets go of strikes all modes of the bore. On the highest notes the low ones are struck hardest, and a soft note would be heard as a grunt
-//! until it outgrows them. So the lip lets the reed swing more freely while such a note begins, which favours the mode that is next to the reed's resonance.
+//! What the tongue lets go of strikes all modes of the bore. On the highest notes the low ones are struck hardest, and a soft note would
+//! be heard as a grunt until it outgrows them. So the lip lets the reed swing more freely while such a note begins, which favours the mode
+//! that is next to the reed's resonance.
 
 use super::dynamics::high;
 use super::lip_glide::LipHelp;
@@ -37,8 +38,8 @@ const HARD: (f64, f64) = (0.2, 0.1);
 /// Hard: how much more quickly the tongue lets go.
 const HARD_RELEASE: f64 = 2.0;
 
-/// What the lip takes from the factor on the reed's damping while a note begins: wholly from written E flat 6 on, nothing up to C6. With 0.4, G6 begins more than 5 dB louder than it
-/// goes on.
+/// What the lip takes from the factor on the reed's damping while a note begins: wholly from written E flat 6 on, nothing up to C6. With
+/// 0.4, G6 begins more than 5 dB louder than it goes on.
 const HIGH_FREEDOM: f64 = 0.35;
 /// For how long, periods of the note: 0.029 s on written E flat 6 of a B flat clarinet, and 0.017 s on C7.
 const HIGH_PERIODS: f64 = 32.0;

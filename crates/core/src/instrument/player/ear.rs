@@ -22,8 +22,8 @@ const GENTLE: (f64, f64) = (0.16, 0.55);
 const LOW: (f64, f64) = (-0.6, -1.0);
 /// See [`LOW`].
 const LOW_PUSH: (f64, f64) = (1.2, 0.08);
-/// The hardest for tongued notes, wholly from written E flat 6 on and not up to C6: their lower modes have lower thresholds, and a harder push lets these in first. With
-/// 0.60 these are up to 2 dB louder.
+/// The hardest for tongued notes, wholly from written E flat 6 on and not up to C6: their lower modes have lower thresholds, and a harder
+/// push lets these in first. With 0.60 these are up to 2 dB louder.
 const HIGH_HARDEST: f64 = 0.45;
 /// Easing off takes away at most this share of the pressure: a note must not end.
 const SOFTEST: f64 = 0.06;
@@ -92,13 +92,10 @@ impl Ear {
         let distance = 0.5
             * maths::ln((amplitude * amplitude).max(SILENCE * SILENCE) / self.power.max(SILENCE * SILENCE));
         let low = ((LOW.0 - place) / (LOW.0 - LOW.1)).clamp(0.0, 1.0);
+        let easier = if self.begun == Begun::Tongued { (HIGH_HARDEST - HARDEST) * high(place) } else { 0.0 };
         let (push, hardest) = match self.begun {
             Begun::SlurredWithin => GENTLE,
-            Begun::Slurred => (PUSH * (1.0 + LOW_PUSH.0 * low), HARDEST + LOW_PUSH.1 * low),
-            Begun::Tongued => (
-                PUSH * (1.0 + LOW_PUSH.0 * low),
-                HARDEST + LOW_PUSH.1 * low + (HIGH_HARDEST - HARDEST) * high(place),
-            ),
+            _ => (PUSH * (1.0 + LOW_PUSH.0 * low), HARDEST + LOW_PUSH.1 * low + easier),
         };
         let push = push * distance.clamp(DISTANCES.0, DISTANCES.1);
         (gamma + push).clamp((1.0 - SOFTEST) * gamma, gamma.max(hardest))

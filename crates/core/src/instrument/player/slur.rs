@@ -13,12 +13,13 @@
 //! note. There the fingers are quick, and the lip damps the reed a little. Into the altissimo it lets the reed swing more freely, so that
 //! the new note grows sooner. Within the altissimo neighbours have fingerings of their own, so the fingers move as where the register changes.
 //!
-//! Leaps down into the low chalumeau by more than an octave do not arrive so: they keep the twelfth. There the lip takes most of the old note away, which is
-//! heard as a light tongue. It damps the reed the more, the lower the new note is: what a damped reed takes from a mode grows with the square of its
-//! frequency, and what the bore takes with the root.
+//! Leaps down into the low chalumeau by more than an octave do not arrive so: they keep the twelfth. There the lip takes most of the old
+//! note away, which is heard as a light tongue. It damps the reed the more, the lower the new note is: what a damped reed takes from a mode
+//! grows with the square of its frequency, and what the bore takes with the root.
 //!
-//! Down into the throat the old mode dies in the lengthening column, and the new one grows from little. There the fingers take more time, and the lip lets
-//! the reed swing a little more freely, unless it beats.
+//! Down into the throat the old mode dies in the lengthening column, and the new one grows from little. There the fingers take more time,
+//! and the lip lets the reed swing a little more freely. Where the reed beats it does not, and into the lowest of these notes, which hold
+//! on to their twelfth as the low chalumeau does, it damps the reed.
 
 use super::lip_glide::LipHelp;
 
@@ -39,11 +40,12 @@ const DAMPED: LipHelp = LipHelp { damping: 1.85, length_s: 0.025 };
 /// Leaps down into the low chalumeau over more than so many cents: more than an octave. Above it they arrive by themselves; with so much
 /// damping they fall silent for 0.1 s.
 const WIDE_CENTS: f64 = 1_250.0;
-/// What the lip adds to the factor on the reed's damping in these, into the lowest note. Of 612 from written B4..C6 into E3..D#4, at four values of CC 2,
-/// none is lost with it. With 2.5, three into E3 are lost at full breath; six times the damping on every note made holes of 25 dB in the median (`docs/tone.md`).
+/// What the lip adds to the factor on the reed's damping in these, into the lowest note. Of 612 from written B4..C6 into E3..D#4, at four
+/// values of CC 2, none is lost with it. With 2.5, three into E3 are lost at full breath; six times the damping on every note made holes of
+/// 25 dB in the median (`docs/tone.md`).
 const WIDE_DAMPING: f64 = 3.5;
-/// How long the lip helps in these and into the throat, periods of the new note: from 0.1 s into written E3 to 0.035 s into A#4 on a B flat clarinet. In
-/// 0.1 s at most on every note, 2 of 459 slurs on the bass are lost with twice this damping.
+/// How long the lip helps in these and into the throat, periods of the new note: from 0.1 s into written E3 to 0.035 s into A#4 on a B flat
+/// clarinet. In 0.1 s at most on every note, 2 of 459 slurs on the bass are lost with twice this damping.
 const PERIODS: f64 = 15.0;
 /// Factor on the legato time in these. Measured with a factor of 4: at 1.8 the holes are 3 to 4 dB deeper, and as many slurs arrive.
 const WIDE_TIME: f64 = 1.0;
@@ -55,17 +57,17 @@ const FROM_ALTISSIMO_DAMPED: LipHelp = LipHelp { damping: 1.3, length_s: 0.03 };
 const FROM_ALTISSIMO_TIME: f64 = 0.8;
 /// Share of the time of the slur that each finger takes there. With 0.55 a tenth more take longer than 0.1 s.
 const FROM_ALTISSIMO_SHARE: f64 = 0.4;
-/// What the lip takes from the factor on the reed's damping in slurs down over the break into the throat. With 0.2 holes are 2 dB shallower, and at CC 45
-/// bumps up to 1 dB louder (`docs/tone.md`).
+/// What the lip takes from the factor on the reed's damping in soft slurs down over the break into the throat. With 0.2 holes are 2 dB
+/// shallower, and at CC 45 bumps up to 1 dB louder (`docs/tone.md`).
 const THROAT_FREEDOM: f64 = 0.15;
-/// Mouth over closing pressures between which it ceases to. Loud notes grow soon by themselves, and a beating reed that swings freely squeaks: at CC 108 and
-/// 127 it makes bumps of 3 dB and clicks of 12.
-const THROAT_LOUD: (f64, f64) = (0.45, 0.6);
-/// What it adds to it where the lowest of these notes hold on to their second mode while the reed beats: wholly at [`LOW_PLACE`], and no more from the place
-/// of written G4 on. Without it written E4 stays on its twelfth for up to 0.6 s at full breath, with 0.8 holes are 5 dB deeper (`docs/tone.md`).
+/// What it adds to the factor in loud ones into the lowest notes of the throat, wholly at [`LOW_PLACE`]. Without it written E4 stays on its
+/// twelfth for up to 0.6 s at full breath, with 0.8 holes are 5 dB deeper (`docs/tone.md`).
 const THROAT_DAMPING: f64 = 0.5;
-/// See [`THROAT_DAMPING`].
+/// Notes from this place on, written G4, leave their second mode by themselves.
 const THROAT_HOLDS: f64 = -0.27;
+/// Mouth over closing pressures between which a slur goes over from soft to loud, as the reed comes to beat. With the freedom of soft ones
+/// a beating reed squeaks: at CC 108 and 127 there are bumps of 3 dB and clicks of 12.
+const THROAT_LOUD: (f64, f64) = (0.45, 0.6);
 /// Factor on the legato time in these. Measured with this lip, at 2.9, 3.5 and 4: nine tenths of the holes are 12.8, 11.3 and 10.3 dB deep.
 const THROAT_TIME: f64 = 4.0;
 /// What the lip does up into the altissimo. Of 208 slurs from C5..C6 to F#6..A6, nine tenths have arrived after 235 ms without it, 175 with
@@ -127,15 +129,19 @@ impl Slur {
         leaps && gamma >= if leap_cents < NARROW.0 { NARROW.1 } else { BEATING }
     }
 
+    /// Whether it comes down over the break.
+    fn is_down_over_the_break(&self) -> bool {
+        self.registers.0 > 1 && self.registers.1 == 1
+    }
+
     /// Whether it leaps down into the low chalumeau by more than an octave.
     fn is_wide(&self) -> bool {
-        let down = self.registers.0 > self.registers.1 && self.registers.1 == 1;
-        down && self.place < LOW_PLACE && -self.interval_cents > WIDE_CENTS
+        self.is_down_over_the_break() && self.place < LOW_PLACE && -self.interval_cents > WIDE_CENTS
     }
 
     /// Whether it comes down over the break into the throat.
     fn is_into_the_throat(&self) -> bool {
-        self.registers.0 > self.registers.1 && self.registers.1 == 1 && self.place >= LOW_PLACE
+        self.is_down_over_the_break() && self.place >= LOW_PLACE
     }
 
     /// What the lip does in a leap down by more than an octave.
@@ -144,7 +150,7 @@ impl Slur {
         LipHelp { damping: 1.0 + WIDE_DAMPING / (ratio * ratio.sqrt()), length_s: PERIODS / self.note_hz }
     }
 
-    /// What it does down into the throat at a mouth over closing pressure.
+    /// What the lip does down into the throat at a mouth over closing pressure.
     fn throat_help(&self, gamma: f64) -> LipHelp {
         let (soft, loud) = THROAT_LOUD;
         let loudness = ((gamma - soft) / (loud - soft)).clamp(0.0, 1.0);
@@ -185,8 +191,8 @@ impl Slur {
                 (3, 3) if self.interval_cents > 0.0 && gamma > 0.0 => UP_TIME,
                 (3, 3) => ALTISSIMO_DOWN_TIME,
                 (3, 2) => FROM_ALTISSIMO_TIME,
-                (2 | 3, 1) if self.is_into_the_throat() => THROAT_TIME,
-                (2 | 3, 1) => DOWN_TIME,
+                _ if self.is_into_the_throat() => THROAT_TIME,
+                _ if self.is_down_over_the_break() => DOWN_TIME,
                 _ => OTHER_TIME,
             },
             finger_share: match self.registers {
