@@ -180,13 +180,12 @@ impl Resampler {
     ///
     /// # Panics
     /// With debug assertions, if there are more inputs, or if `pull` has not come back short. Without them, what is more is dropped.
-    #[inline]
+    // A call would cost a voice an instruction a sample.
+    #[inline(always)]
     pub fn push(&mut self, input: &[f32], speed: f64) {
         debug_assert!(
             input.len() <= Self::PUSH_MOST && self.end > self.next,
-            "push takes at most {} inputs, and only after pull came back short; got {}",
-            Self::PUSH_MOST,
-            input.len()
+            "push takes at most PUSH_MOST inputs, and only after pull came back short"
         );
         let input = &input[..input.len().min(Self::PUSH_MOST)];
         if self.next + input.len() + BEYOND > self.history.len() {

@@ -87,15 +87,19 @@ impl Ear {
     }
 
     /// Mouth over closing pressure with the push towards an amplitude, where `gamma` would hold it, for a
-    /// note at this [place](super::dynamics::PlayerModel::place).
+    /// note at this [place](super::dynamics::PlayerModel::place). Once a tick: a call would cost a voice an instruction a sample.
+    #[inline]
     pub fn pushed(&self, gamma: f64, amplitude: f64, place: f64) -> f64 {
         let distance = 0.5
             * maths::ln((amplitude * amplitude).max(SILENCE * SILENCE) / self.power.max(SILENCE * SILENCE));
-        let low = ((LOW.0 - place) / (LOW.0 - LOW.1)).clamp(0.0, 1.0);
-        let easier = if self.begun == Begun::Tongued { (HIGH_HARDEST - HARDEST) * high(place) } else { 0.0 };
         let (push, hardest) = match self.begun {
             Begun::SlurredWithin => GENTLE,
-            _ => (PUSH * (1.0 + LOW_PUSH.0 * low), HARDEST + LOW_PUSH.1 * low + easier),
+            // Of the two halves of the compass one has low notes, the other high ones.
+            Begun::Tongued if place > 0.0 => (PUSH, HARDEST + (HIGH_HARDEST - HARDEST) * high(place)),
+            _ => {
+                let low = ((LOW.0 - place) / (LOW.0 - LOW.1)).clamp(0.0, 1.0);
+                (PUSH * (1.0 + LOW_PUSH.0 * low), HARDEST + LOW_PUSH.1 * low)
+            }
         };
         let push = push * distance.clamp(DISTANCES.0, DISTANCES.1);
         (gamma + push).clamp((1.0 - SOFTEST) * gamma, gamma.max(hardest))

@@ -283,6 +283,7 @@ impl Posture {
     }
 
     /// What a dynamic, 0..=1, asks of the breath; nothing where the breath is physical.
+    #[inline]
     pub fn played_breath(&mut self, dynamic: f64) -> PlayedBreath {
         let Some(played) = &mut self.played else { return PlayedBreath::default() };
         if played.asked.0 != dynamic {
