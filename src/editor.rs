@@ -15,6 +15,8 @@ mod breath_view;
 mod chart;
 mod clarinet_drawing;
 mod clarinet_view;
+pub mod connections;
+mod connections_view;
 pub mod controls;
 mod dynamic_meter;
 pub mod feel_test;
@@ -57,6 +59,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, Theme, Ui};
 use serde::{Deserialize, Serialize};
 
 pub use ab_comparison::AbComparison;
+use connections::DeviceChoice;
 pub use controls::{Controls, Look};
 pub use feel_test::FeelTest;
 pub use note_names::note_name;
@@ -102,6 +105,10 @@ pub enum Action {
     FindFingerings(Option<FingeringQuestion>),
     /// A device of the list, by its key.
     ChooseDevice(String),
+    /// Look which devices for sound and MIDI there are.
+    LookForDevices,
+    /// Start again with these devices for sound and MIDI.
+    UseDevices(DeviceChoice),
     /// The user alters these holes and joints; all others are as built.
     Alter(Alterations),
     /// Save an altered instrument as a file of the user's.

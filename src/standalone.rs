@@ -3,12 +3,14 @@
 //! The framework opens one backend. Asked for *auto*, it may silently choose one that makes no sound. So this program
 //! tries each backend by itself. If none opens, it prints which ones it tried, why they failed, and what to do.
 //!
-//! - `arguments`: the command line; `log`: what the framework logs; `quit`: the end on Ctrl-C
+//! - `arguments`: the command line; `log`: what the framework logs; `quit`: the end on Ctrl-C, and the next start
+//! - `devices`: lists outputs and inputs for the window, and keeps what the user chooses there
 //! - `standalone_plugin`: the plugin as the framework runs it here; `session`: what it remembers from one start to the next
 //! - `jack`: plays to a JACK server, and survives its death
 //! - `keyboards`: opens the system's MIDI inputs where JACK does not play
 
 mod arguments;
+mod devices;
 mod jack;
 mod keyboards;
 mod log;
@@ -23,8 +25,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Parser;
 use nice_plug::prelude::nice_export_standalone_with_args;
 
+use crate::editor::connections::Connections;
 use crate::plugin::launch_options::LaunchOptions;
-use arguments::{Args, Backend};
+use arguments::{Args, Attempt, Backend};
 use jack::{JackClient, JackLink};
 use keyboards::Keyboards;
 use standalone_plugin::StandalonePlugin;
@@ -40,17 +43,21 @@ pub fn main() -> ExitCode {
             "chalumeau-standalone: no display (DISPLAY is not set), so it plays without a window; press Ctrl-C to quit"
         );
     }
+    let has_window = !args.no_window && !lacks_display;
     let options = LaunchOptions {
         instrument: args.instrument.clone(),
         a4_hz: args.a4,
-        microphone: args.has_microphone(),
-        has_window: !args.no_window && !lacks_display,
+        microphone: AtomicBool::new(false),
+        has_window,
         quit: AtomicBool::new(false),
+        restart: AtomicBool::new(false),
         window_failed: AtomicBool::new(false),
         connections: Mutex::default(),
+        device_tasks: Mutex::default(),
     }
     .set();
     quit::listen(options);
+    devices::serve(options);
     if args.new_session {
         session::set_aside();
     }
@@ -59,41 +66,73 @@ pub fn main() -> ExitCode {
         eprintln!("chalumeau-standalone: {why}");
         std::process::exit(1);
     }));
-    let mut tried = Vec::new();
-    let tries = args.backends().into_iter();
-    for (backend, inputs) in tries.flat_map(|one| args.inputs(one).iter().map(move |&inputs| (one, inputs))) {
+    let kept = devices::kept();
+    let mut attempts = args.attempts(&kept);
+    if has_window && !args.names_a_place() {
+        attempts.push(Attempt::silent());
+    }
+    let mut tried: Vec<(Attempt, String)> = Vec::new();
+    for attempt in attempts {
         last_error.clear();
-        LaunchOptions::connect(|now| *now = args.connections(backend));
+        LaunchOptions::connect(|now| {
+            *now = Connections {
+                chosen: kept.clone(),
+                problem: problem(&attempt, &tried),
+                devices: now.devices.clone(),
+                ..args.connections(&attempt)
+            };
+        });
+        options.microphone.store(args.hears_microphone(&attempt), Ordering::Relaxed);
         // Held while the framework plays.
-        let _keyboards = args.keyboards(backend).map(Keyboards::open);
-        let words = match (backend == Backend::Jack).then(JackClient::open) {
-            None => args.for_framework(backend, args.sample_rate, inputs),
+        let _keyboards = args.keyboards(&attempt).map(Keyboards::open);
+        let words = match (attempt.backend == Backend::Jack).then(JackClient::open) {
+            None => args.for_framework(&attempt),
             Some(Ok(client)) => {
-                let words = args.for_framework(Backend::Dummy, client.rate_hz(), 0);
-                LaunchOptions::connect(|now| now.sound = format!("JACK, {} Hz", client.rate_hz()));
+                let rate_hz = client.rate_hz();
+                LaunchOptions::connect(|now| now.sound = format!("JACK, {rate_hz} Hz"));
                 JackLink::offer(client, args.jack_ports());
-                words
+                args.for_framework(&Attempt { backend: Backend::Dummy, rate_hz, ..attempt.clone() })
             }
             Some(Err(reason)) => {
-                tried.push((backend, reason));
+                tried.push((attempt, reason));
                 continue;
             }
         };
         if nice_export_standalone_with_args::<StandalonePlugin, _>(words) {
-            return ExitCode::SUCCESS;
+            return quit::end(options);
         }
         if options.window_failed.load(Ordering::Relaxed) {
             // It has played without a window, and the framework has logged why there was none.
             return ExitCode::SUCCESS;
         }
         let reason = last_error.get().unwrap_or_else(|| "it gave no reason".to_owned());
-        if let Some(code) = device_list_answer(&reason) {
+        if args.names_a_place()
+            && let Some(code) = device_list_answer(&reason)
+        {
             return code;
         }
-        tried.push((backend, reason));
+        tried.push((attempt, reason));
     }
     eprintln!("{}", no_backend_message(&tried));
     ExitCode::FAILURE
+}
+
+/// What the window says if this is not what the user has chosen.
+fn problem(attempt: &Attempt, tried: &[(Attempt, String)]) -> Option<String> {
+    let (first, reason) = tried.first().filter(|_| attempt.is_instead)?;
+    // The framework lists devices after its reason.
+    let reason = reason.split(". Available devices are:").next().unwrap_or(reason);
+    let now = match attempt.backend {
+        Backend::Dummy => "No sound",
+        Backend::Jack => "Sound goes to JACK",
+        _ => "Sound goes to the system's output",
+    };
+    let name = match (&first.output, first.backend) {
+        (Some(name), _) => name.as_str(),
+        (None, Backend::Jack) => "JACK",
+        (None, _) => "the system's output",
+    };
+    Some(format!("{now}: {name} does not open ({reason}). Choose an output in the Instrument view."))
 }
 
 /// Whether windows need X11 here and it is missing.
@@ -117,11 +156,15 @@ fn device_list_answer(reason: &str) -> Option<ExitCode> {
 }
 
 /// Which backends were tried, why they failed, what to do.
-fn no_backend_message(tried: &[(Backend, String)]) -> String {
+fn no_backend_message(tried: &[(Attempt, String)]) -> String {
     let mut text = "chalumeau-standalone: no sound output opens".to_owned();
-    for (backend, reason) in tried {
-        text += &format!("\n  tried {}: {reason}", backend.name());
-        text += &format!("\n    {}", backend.remedy());
+    let mut said = Vec::new();
+    for (Attempt { backend, .. }, reason) in tried {
+        // Attempts at other rates fail for the same reason where there is no sound card.
+        if !said.contains(&(backend, reason)) {
+            said.push((backend, reason));
+            text += &format!("\n  tried {}: {reason}\n    {}", backend.name(), backend.remedy());
+        }
     }
     text + "\n  without sound: --backend dummy; into a file: chalumeau render"
 }
@@ -138,11 +181,32 @@ mod tests {
         assert_eq!(device_list_answer("No default audio output device available"), None);
     }
 
+    fn attempt(backend: Backend) -> Attempt {
+        Attempt { backend, ..Attempt::silent() }
+    }
+
+    #[test]
+    fn the_window_says_what_does_not_open_and_where_sound_goes_instead() {
+        let card =
+            Attempt { output: Some("Card".to_owned()), is_instead: false, ..attempt(arguments::SYSTEM) };
+        assert_eq!(problem(&card, &[]), None);
+        let reason = "Unknown output device 'Card'. Available devices are:\nOther".to_owned();
+        let said = problem(&attempt(arguments::SYSTEM), &[(card.clone(), reason)]).unwrap();
+        assert_eq!(
+            said,
+            "Sound goes to the system's output: Card does not open (Unknown output device 'Card'). Choose an output in the \
+             Instrument view."
+        );
+        // Automatic has tried one of its own.
+        let jack = Attempt { is_instead: false, ..attempt(Backend::Jack) };
+        assert_eq!(problem(&Attempt { output: None, ..card }, &[(jack, "no server".to_owned())]), None);
+    }
+
     #[test]
     fn the_message_says_what_was_tried_why_it_failed_and_what_to_do() {
         let text = no_backend_message(&[
-            (Backend::Jack, "no JACK server is running".to_owned()),
-            (arguments::SYSTEM, "no card".to_owned()),
+            (attempt(Backend::Jack), "no JACK server is running".to_owned()),
+            (attempt(arguments::SYSTEM), "no card".to_owned()),
         ]);
         for word in ["tried jack: no JACK server is running", "no card", "--output-device", "--backend dummy"]
         {

@@ -5,10 +5,11 @@ use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, Ui, WidgetInfo, 
 use crate::editor::Action;
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, ruler};
+use crate::editor::connections_view;
 use crate::editor::controls::{Hands, choice, heading, segments, slider, teach};
 use crate::editor::file_browser::{FileBrowser, FileKind};
 use crate::editor::note_names::{NoteNames, note_name};
-use crate::editor::snapshot::{Connections, Snapshot};
+use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 use chalumeau_core::instrument::KeyPitches;
@@ -240,7 +241,7 @@ fn column(
     let c = Colours::here(ui);
     // Who hears nothing looks for it first.
     if let Some(connections) = &snapshot.connections {
-        show_connections(ui, connections);
+        connections_view::draw(ui, connections, actions);
         ui.add_space(8.0);
     }
     ui.label(RichText::new("Names of notes").color(c.quiet));
@@ -264,17 +265,4 @@ fn column(
     heading(ui, "Output");
     slider(ui, hands, "gain");
     choice(ui, hands, "qual");
-}
-
-/// Where sound and MIDI go and come from, in a program without a host.
-fn show_connections(ui: &mut Ui, connections: &Connections) {
-    let c = Colours::here(ui);
-    heading(ui, concat!("Chalumeau ", env!("CARGO_PKG_VERSION")));
-    let mut line = |name: &str, value: &str| {
-        ui.label(RichText::new(name).color(c.quiet));
-        ui.label(value);
-    };
-    line("Sound output", &connections.sound);
-    line("MIDI inputs", &connections.midi_line());
-    ui.label(RichText::new(&connections.how).font(theme::small()).color(c.quiet));
 }

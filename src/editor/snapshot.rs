@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::controllers::breath_input::BreathInput;
+use crate::editor::connections::Connections;
 use crate::editor::fingering_search::FingeringSearch;
 use crate::editor::sound_analysis::SoundAnalysis;
 use crate::folder_listing::FolderListing;
@@ -111,26 +112,6 @@ pub struct Snapshot {
     pub room: Option<(f32, f32)>,
     /// Where sound and MIDI go and come from, in a program without a host.
     pub connections: Option<Connections>,
-}
-
-/// Where sound and MIDI go and come from, in a program without a host.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Connections {
-    /// The sound output.
-    pub sound: String,
-    /// The MIDI inputs that play, and what to say where there is none.
-    pub midi: Vec<String>,
-    /// See [`midi`](Self::midi).
-    pub no_midi: String,
-    /// How the user chooses others.
-    pub how: String,
-}
-
-impl Connections {
-    /// The MIDI inputs on one line.
-    pub fn midi_line(&self) -> String {
-        if self.midi.is_empty() { self.no_midi.clone() } else { self.midi.join(", ") }
-    }
 }
 
 impl Default for Snapshot {

@@ -5,13 +5,23 @@
 //! nobody sets them.
 
 use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::Sender;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use crate::editor::snapshot::Connections;
+use crate::editor::connections::{Connections, DeviceChoice};
 
 use super::params::instrument::InstrumentChoice;
 
 static LAUNCH_OPTIONS: OnceLock<LaunchOptions> = OnceLock::new();
+
+/// What the window asks of the standalone program.
+#[derive(Debug)]
+pub enum DeviceTask {
+    /// Look which devices there are.
+    Look,
+    /// Start again with these.
+    Use(DeviceChoice),
+}
 
 /// Options of this process.
 #[derive(Debug)]
@@ -20,16 +30,20 @@ pub struct LaunchOptions {
     pub instrument: Option<(InstrumentChoice, String)>,
     /// Default of the parameter *A4*, Hz, if the user has given one.
     pub a4_hz: Option<f32>,
-    /// The user has named a microphone: it is on.
-    pub microphone: bool,
+    /// The user has chosen a microphone, which the backend opens: it is on.
+    pub microphone: AtomicBool,
     /// Whether the plugin has a window.
     pub has_window: bool,
     /// The user wants the program to end: the open window closes.
     pub quit: AtomicBool,
+    /// The program starts again when it has ended.
+    pub restart: AtomicBool,
     /// The plugin sets this when its window could not open.
     pub window_failed: AtomicBool,
     /// Where sound and MIDI go and come from, for the window.
     pub connections: Mutex<Connections>,
+    /// Who does what the window asks for.
+    pub device_tasks: Mutex<Option<Sender<DeviceTask>>>,
 }
 
 impl LaunchOptions {
@@ -53,6 +67,16 @@ impl LaunchOptions {
     /// Where sound and MIDI go and come from; `None` in a host.
     pub fn connections() -> Option<Connections> {
         Self::get().map(|options| options.connections.lock().unwrap_or_else(PoisonError::into_inner).clone())
+    }
+
+    /// Asks the program for something. In a host nobody does it.
+    pub fn ask(task: DeviceTask) {
+        let tasks =
+            Self::get().map(|options| options.device_tasks.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(Some(tasks)) = tasks.as_deref() {
+            // It ends with the program.
+            let _ = tasks.send(task);
+        }
     }
 
     /// The options of this process; `None` in a host.

@@ -2,8 +2,10 @@
 
 use clap::{Parser, ValueEnum};
 
+use std::ops::RangeInclusive;
+
 use super::jack::JackPorts;
-use crate::editor::snapshot::Connections;
+use crate::editor::connections::{Connections, DeviceChoice, OutputChoice};
 use crate::plugin::InstrumentChoice;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -13,6 +15,9 @@ use chalumeau_core::instrument::internal_rate::HOST_RATES_HZ;
 /// Time by which the framework delays a microphone, s, at least: input and output of a sound card come at different times. It takes
 /// three periods where that is longer.
 const LEAST_INPUT_LATENCY_S: f32 = 0.02;
+
+/// Samples per block.
+const BLOCKS: RangeInclusive<u32> = 16..=8192;
 
 const HELP: &str = "\
 Examples:
@@ -28,7 +33,7 @@ Examples:
 Play it with a MIDI keyboard, a wind controller, a knob, or the keys in the window. MIDI devices play as soon as you plug
 them in. CC2 or CC11 sets the breath. Until one
 of them moves, key velocity sets it. On the computer's keyboard, letters play: A S D F G H J K are the white keys from C.
-The next start finds the settings of this one. With a microphone, hold keys and blow at it; keep quiet for the first two seconds,
+The next start finds the settings of this one. The Instrument view lists sound outputs and MIDI inputs to choose from. With a microphone, hold keys and blow at it; keep quiet for the first two seconds,
 in which the program measures the room. Without a display, the program plays without a window. To quit, close the window or
 press Ctrl-C.";
 
@@ -39,14 +44,15 @@ pub struct Args {
     /// Where sound and MIDI go.
     #[arg(short, long, default_value = "auto")]
     pub backend: Backend,
-    /// Sample rate, 1000..1536000 Hz; JACK sets its own.
-    #[arg(short = 'r', long, value_name = "HZ", default_value = "48000", value_parser = rate)]
-    pub sample_rate: f32,
-    /// Samples per block, 16..8192; JACK sets its own. Small blocks respond faster, but the sound may drop out.
-    #[arg(short, long, value_name = "SAMPLES", default_value = "256",
-          value_parser = clap::value_parser!(u32).range(16..=8192))]
-    period_size: u32,
-    /// Name of the sound card; an empty name lists them. Not for JACK.
+    /// Sample rate, 1000..1536000 Hz; JACK sets its own. Without it, that chosen in the window, at first 48000.
+    #[arg(short = 'r', long, value_name = "HZ", value_parser = rate)]
+    sample_rate: Option<f32>,
+    /// Samples per block, 16..8192; JACK sets its own. Small blocks respond faster, but the sound may drop out. Without it, that
+    /// chosen in the window, at first 256.
+    #[arg(short, long, value_name = "SAMPLES",
+          value_parser = clap::value_parser!(u32).range(i64::from(*BLOCKS.start())..=i64::from(*BLOCKS.end())))]
+    period_size: Option<u32>,
+    /// Name of the sound card; an empty name lists them. Without it, that chosen in the window. Not for JACK.
     #[arg(short, long, value_name = "NAME")]
     output_device: Option<String>,
     /// Name of the sound card's input with a microphone that you blow at; an empty name lists them. Not for JACK.
@@ -99,6 +105,41 @@ pub enum Backend {
     Wasapi,
     /// No sound and no MIDI.
     Dummy,
+}
+
+/// One way to open sound.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Attempt {
+    /// The backend.
+    pub backend: Backend,
+    /// Name of the sound card; `None` for the system's output.
+    pub output: Option<String>,
+    /// Name of the microphone's sound card, and how many of its channels to open.
+    pub microphone: Option<(String, usize)>,
+    /// Sample rate, Hz; JACK sets its own.
+    pub rate_hz: f32,
+    /// Samples per block; JACK sets its own.
+    pub block: u32,
+    /// Part of the name of the MIDI input; `None` for all.
+    pub midi_input: Option<String>,
+    /// Not what the user has chosen in the window: it is tried when that does not open.
+    pub is_instead: bool,
+}
+
+impl Attempt {
+    /// What remains if nothing opens: a window in which the user can choose.
+    pub fn silent() -> Self {
+        let DeviceChoice { rate_hz, block, .. } = DeviceChoice::default();
+        Self {
+            backend: Backend::Dummy,
+            output: None,
+            microphone: None,
+            rate_hz: rate_hz as f32,
+            block,
+            midi_input: None,
+            is_instead: true,
+        }
+    }
 }
 
 /// The backend of this system's own sound.
@@ -165,43 +206,91 @@ fn instrument(text: &str) -> Result<(InstrumentChoice, String), String> {
 }
 
 impl Args {
-    /// Whether the user has named a microphone.
-    pub fn has_microphone(&self) -> bool {
-        self.input_device.is_some() || self.connect_jack_input.is_some()
+    /// Whether the user says in the arguments where sound and MIDI go, so that the choice in the window does not count.
+    pub fn names_a_place(&self) -> bool {
+        let names = [
+            &self.output_device,
+            &self.input_device,
+            &self.midi_output,
+            &self.connect_jack_input,
+            &self.connect_jack_midi_input,
+            &self.connect_jack_midi_output,
+        ];
+        let lists_midi = self.midi_input.as_deref() == Some("");
+        self.backend != Backend::Auto || lists_midi || names.iter().any(|name| name.is_some())
     }
 
-    /// Channels of the microphone to try, in this order.
-    pub fn inputs(&self, backend: Backend) -> &'static [usize] {
-        match backend {
-            Backend::Jack | Backend::Dummy => &[0],
-            _ if self.input_device.is_none() => &[0],
-            // Some devices have two only.
-            _ => &[1, 2],
+    /// The ways to open sound, in the order in which to try them. `kept` is the user's choice in the window.
+    pub fn attempts(&self, kept: &DeviceChoice) -> Vec<Attempt> {
+        let names_a_place = self.names_a_place();
+        let chosen = if names_a_place { &DeviceChoice::default() } else { kept };
+        let (backends, output) = match &chosen.output {
+            _ if names_a_place => (self.backends(), self.output_device.clone()),
+            OutputChoice::Auto => (self.backends(), None),
+            OutputChoice::Jack => (vec![Backend::Jack], None),
+            OutputChoice::System => (vec![SYSTEM], None),
+            OutputChoice::Device(name) => (vec![SYSTEM], Some(name.clone())),
+        };
+        let microphone = self.input_device.as_ref().or(chosen.microphone.as_ref());
+        let (low, high) = HOST_RATES_HZ;
+        let kept_hz = f64::from(chosen.rate_hz).clamp(low, high) as f32;
+        let rate_hz = self.sample_rate.unwrap_or(kept_hz);
+        let block = self.period_size.unwrap_or(chosen.block.clamp(*BLOCKS.start(), *BLOCKS.end()));
+        let midi_input = self.midi_input.clone().or_else(|| chosen.midi_input.clone());
+        let plain = Attempt {
+            backend: SYSTEM,
+            output: None,
+            microphone: None,
+            rate_hz,
+            block,
+            midi_input,
+            is_instead: false,
+        };
+        let mut attempts = Vec::new();
+        for backend in backends {
+            let of_system = Attempt { backend, output: output.clone(), ..plain.clone() };
+            match microphone.filter(|_| !matches!(backend, Backend::Jack | Backend::Dummy)) {
+                // Some devices have two channels only.
+                Some(name) => attempts.extend([1, 2].map(|channels| Attempt {
+                    microphone: Some((name.clone(), channels)),
+                    ..of_system.clone()
+                })),
+                None => attempts.push(of_system),
+            }
         }
+        if !names_a_place {
+            let usual = DeviceChoice::default();
+            let (rate_hz, block) = (usual.rate_hz as f32, usual.block);
+            let jack = Attempt { backend: Backend::Jack, ..plain.clone() };
+            for instead in [plain.clone(), Attempt { rate_hz, block, ..plain }, jack] {
+                if !attempts.contains(&instead) {
+                    attempts.push(Attempt { is_instead: true, ..instead });
+                }
+            }
+        }
+        attempts
     }
 
-    /// The arguments for the framework. With JACK it runs the dummy backend at the server's rate, Hz. `inputs`: channels of the
-    /// microphone.
-    pub fn for_framework(&self, backend: Backend, rate_hz: f32, inputs: usize) -> Vec<String> {
+    /// The arguments for the framework. With JACK it runs the dummy backend at the server's rate.
+    pub fn for_framework(&self, attempt: &Attempt) -> Vec<String> {
         let mut words = vec!["chalumeau-standalone".to_owned()];
         let mut add = |name: &str, value: String| words.push(format!("--{name}={value}"));
-        add("backend", backend.name());
-        add("sample-rate", rate_hz.to_string());
-        add("period-size", self.period_size.to_string());
+        let inputs = attempt.microphone.as_ref().map_or(0, |(_, channels)| *channels);
+        add("backend", attempt.backend.name());
+        add("sample-rate", attempt.rate_hz.to_string());
+        add("period-size", attempt.block.to_string());
         // The plugin's layouts are numbered from 1, and have none, one and two.
         add("audio-layout", (inputs + 1).to_string());
-        if inputs > 0 {
-            let latency_s = (3.0 * self.period_size as f32 / rate_hz).max(LEAST_INPUT_LATENCY_S);
+        if let Some((name, _)) = &attempt.microphone {
+            let latency_s = (3.0 * attempt.block as f32 / attempt.rate_hz).max(LEAST_INPUT_LATENCY_S);
             add("input-latency", latency_s.to_string());
-            add("input-device", self.input_device.clone().unwrap_or_default());
+            add("input-device", name.clone());
         }
         // The framework lists the MIDI inputs, and opens none.
         let listed = self.midi_input.clone().filter(String::is_empty);
-        for (name, value) in [
-            ("output-device", &self.output_device),
-            ("midi-input", &listed),
-            ("midi-output", &self.midi_output),
-        ] {
+        for (name, value) in
+            [("output-device", &attempt.output), ("midi-input", &listed), ("midi-output", &self.midi_output)]
+        {
             if let Some(value) = value {
                 add(name, value.clone());
             }
@@ -209,43 +298,47 @@ impl Args {
         words
     }
 
-    /// Which MIDI inputs to open beside this backend: `None` for none of them, else part of their names, if the user has given it.
-    pub fn keyboards(&self, backend: Backend) -> Option<Option<String>> {
+    /// Which MIDI inputs to open in this attempt: `None` for none of them, else part of their names, if the user has given it.
+    pub fn keyboards(&self, attempt: &Attempt) -> Option<Option<String>> {
         let is_listed = self.midi_input.as_deref() == Some("");
-        let has_own = matches!(backend, Backend::Jack | Backend::Dummy);
-        (!is_listed && !has_own).then(|| self.midi_input.clone())
+        let has_own = matches!(attempt.backend, Backend::Jack | Backend::Dummy);
+        (!is_listed && !has_own).then(|| attempt.midi_input.clone())
     }
 
-    /// Where sound goes with this backend, and how to choose another place, for the window. MIDI inputs come later.
-    pub fn connections(&self, backend: Backend) -> Connections {
-        let (sound, how) = match backend {
-            Backend::Dummy => ("none".to_owned(), "To hear it, start the program without --backend dummy."),
-            Backend::Auto | Backend::Jack => (
-                "JACK".to_owned(),
-                "A patchbay for JACK connects other outputs and MIDI devices. For a sound card without JACK, start the program with \
-                 --output-device \"NAME\".",
-            ),
+    /// Where sound goes in this attempt, for the window. MIDI inputs come later.
+    pub fn connections(&self, attempt: &Attempt) -> Connections {
+        let (sound, how) = match attempt.backend {
+            Backend::Dummy => ("none", ""),
+            Backend::Auto | Backend::Jack => {
+                ("JACK", "A patchbay for JACK connects other outputs, MIDI devices and a microphone.")
+            }
             // Where the system has no other backend, the two above are all.
             #[allow(unreachable_patterns)]
-            _ => {
-                let device = self.output_device.as_deref().unwrap_or("the system's output");
-                let (name, rate_hz, frames) = (backend.name(), self.sample_rate, self.period_size);
-                (
-                    format!("{device} ({name}), {rate_hz} Hz, blocks of {frames}"),
-                    "For another, start the program with --output-device \"NAME\" or --midi-input \"NAME\"; an empty name lists them.",
-                )
+            _ => (attempt.output.as_deref().unwrap_or("the system's output"), ""),
+        };
+        let sound = match attempt.backend {
+            Backend::Dummy | Backend::Auto | Backend::Jack => sound.to_owned(),
+            #[allow(unreachable_patterns)]
+            backend => {
+                format!("{sound} ({}), {} Hz, blocks of {}", backend.name(), attempt.rate_hz, attempt.block)
             }
         };
-        let no_midi = match (backend, &self.midi_input, &self.connect_jack_midi_input) {
+        let no_midi = match (attempt.backend, &attempt.midi_input, &self.connect_jack_midi_input) {
             // Without a backend, no MIDI input is opened.
             (Backend::Dummy, ..) => "none".to_owned(),
-            (_, Some(name), _) if !name.is_empty() => format!("none named {name}"),
             (Backend::Auto | Backend::Jack, _, Some(port)) => {
                 format!("none; the JACK port {port} is not there")
             }
+            (backend, Some(name), _) if backend != Backend::Jack => format!("none named {name}"),
             _ => "none; a keyboard plays as soon as you plug it in".to_owned(),
         };
-        Connections { sound, midi: Vec::new(), no_midi, how: how.to_owned() }
+        Connections { sound, no_midi, how: how.to_owned(), ..Connections::default() }
+    }
+
+    /// Whether this attempt opens a microphone that the user has named.
+    pub fn hears_microphone(&self, attempt: &Attempt) -> bool {
+        let has_port = attempt.backend == Backend::Jack && self.connect_jack_input.is_some();
+        attempt.microphone.is_some() || has_port
     }
 
     /// The JACK ports to connect to.
@@ -290,19 +383,70 @@ mod tests {
         assert_eq!(args(&["--connect-jack-input", "a:b"]).backends(), [Backend::Jack]);
     }
 
+    fn attempts(words: &[&str]) -> Vec<Attempt> {
+        args(words).attempts(&DeviceChoice::default())
+    }
+
     #[test]
     fn a_microphone_is_off_until_it_is_named() {
-        let none = args(&[]);
-        assert!(!none.has_microphone());
-        assert_eq!(none.inputs(SYSTEM), [0]);
-        assert!(!none.for_framework(SYSTEM, 48_000.0, 0).iter().any(|word| word.contains("input-device")));
-        let named = args(&["--input-device", "Mic"]);
-        assert!(named.has_microphone() && args(&["--connect-jack-input", "a:b"]).has_microphone());
-        assert_eq!((named.inputs(SYSTEM), named.inputs(Backend::Dummy)), (&[1, 2][..], &[0][..]));
-        let words = named.for_framework(SYSTEM, 48_000.0, 1);
+        assert!(attempts(&[]).iter().all(|attempt| attempt.microphone.is_none()));
+        let first = &attempts(&[])[1];
+        assert_eq!(first.backend, SYSTEM);
+        assert!(!args(&[]).for_framework(first).iter().any(|word| word.contains("input-device")));
+        let named = attempts(&["--input-device", "Mic"]);
+        let channels = |attempt: &Attempt| attempt.microphone.as_ref().map(|(_, channels)| *channels);
+        assert_eq!(named.iter().map(channels).collect::<Vec<_>>(), [Some(1), Some(2)]);
+        assert!(attempts(&["--backend", "dummy", "--input-device", "Mic"])[0].microphone.is_none());
+        let words = args(&["--input-device", "Mic"]).for_framework(&named[0]);
         for word in ["--input-device=Mic", "--audio-layout=2", "--input-latency=0.02"] {
             assert!(words.iter().any(|own| own == word), "no {word} in {words:?}");
         }
+    }
+
+    #[test]
+    fn the_choice_in_the_window_counts_where_the_arguments_are_silent() {
+        let kept = DeviceChoice {
+            output: OutputChoice::Device("Card".to_owned()),
+            rate_hz: 96_000,
+            block: 128,
+            microphone: Some("Mic".to_owned()),
+            midi_input: Some("Wind".to_owned()),
+        };
+        let all = args(&[]).attempts(&kept);
+        let wanted: Vec<_> = all.iter().filter(|attempt| !attempt.is_instead).collect();
+        assert_eq!(wanted.len(), 2, "{all:?}");
+        for (attempt, channels) in wanted.into_iter().zip([1, 2]) {
+            assert_eq!((attempt.backend, attempt.output.as_deref()), (SYSTEM, Some("Card")));
+            assert_eq!((attempt.rate_hz, attempt.block), (96_000.0, 128));
+            assert_eq!(attempt.microphone, Some(("Mic".to_owned(), channels)));
+            assert_eq!(args(&[]).keyboards(attempt), Some(Some("Wind".to_owned())));
+        }
+        // Without the card the system's output plays, at the rate it has been given, else at the usual one; and then JACK.
+        let instead: Vec<_> = all.iter().filter(|attempt| attempt.is_instead).collect();
+        assert_eq!(
+            instead.iter().map(|one| one.backend).collect::<Vec<_>>(),
+            [SYSTEM, SYSTEM, Backend::Jack]
+        );
+        assert_eq!(instead.iter().map(|one| one.rate_hz).collect::<Vec<_>>(), [96_000.0, 48_000.0, 96_000.0]);
+        assert!(instead.iter().all(|one| one.output.is_none() && one.microphone.is_none()));
+        // What the arguments say goes first.
+        let other = args(&["-o", "Other", "-r", "44100"]).attempts(&kept);
+        assert_eq!(other.len(), 1, "{other:?}");
+        assert_eq!(
+            (other[0].output.as_deref(), other[0].rate_hz, other[0].block),
+            (Some("Other"), 44_100.0, 256)
+        );
+        assert_eq!(args(&["--midi-input", "Keys"]).attempts(&kept)[0].midi_input.as_deref(), Some("Keys"));
+        assert!(
+            args(&["--backend", "dummy"]).attempts(&kept).iter().all(|one| one.backend == Backend::Dummy)
+        );
+    }
+
+    #[test]
+    fn an_absurd_choice_is_brought_into_range() {
+        let kept = DeviceChoice { rate_hz: 0, block: 1 << 30, ..DeviceChoice::default() };
+        let first = &args(&[]).attempts(&kept)[0];
+        assert_eq!((f64::from(first.rate_hz), first.block), (HOST_RATES_HZ.0, 8192));
     }
 
     #[test]
@@ -324,7 +468,7 @@ mod tests {
     #[test]
     fn the_framework_gets_the_arguments_of_the_user() {
         let args = args(&["-r", "44100", "-o", "", "-m", "Wind"]);
-        let words = args.for_framework(SYSTEM, args.sample_rate, 0);
+        let words = args.for_framework(&args.attempts(&DeviceChoice::default())[0]);
         for word in ["--sample-rate=44100", "--output-device="] {
             assert!(words.iter().any(|said| said == word), "{words:?}");
         }
@@ -332,15 +476,16 @@ mod tests {
 
     #[test]
     fn the_framework_lists_midi_inputs_and_the_program_opens_them() {
-        let frameworks = |args: &Args| args.for_framework(SYSTEM, 48_000.0, 0).join(" ");
-        let named = args(&["-m", "Wind"]);
-        assert!(!frameworks(&named).contains("midi-input"));
-        assert_eq!(named.keyboards(SYSTEM), Some(Some("Wind".to_owned())));
+        let first = |args: &Args| args.attempts(&DeviceChoice::default()).swap_remove(0);
+        let named = args(&["-b", SYSTEM.name().as_str(), "-m", "Wind"]);
+        assert!(!named.for_framework(&first(&named)).join(" ").contains("midi-input"));
+        assert_eq!(named.keyboards(&first(&named)), Some(Some("Wind".to_owned())));
         let asked = args(&["-m", ""]);
-        assert!(frameworks(&asked).ends_with("--midi-input="));
-        assert_eq!(asked.keyboards(SYSTEM), None);
-        let unasked = args(&[]);
-        assert_eq!(unasked.keyboards(SYSTEM), Some(None));
-        assert_eq!([Backend::Jack, Backend::Dummy].map(|backend| unasked.keyboards(backend)), [None, None]);
+        assert!(asked.for_framework(&first(&asked)).join(" ").ends_with("--midi-input="));
+        assert_eq!(asked.keyboards(&first(&asked)), None);
+        for (backend, opens) in [(SYSTEM, Some(None)), (Backend::Jack, None), (Backend::Dummy, None)] {
+            let unasked = args(&["-b", backend.name().as_str()]);
+            assert_eq!(unasked.keyboards(&first(&unasked)), opens);
+        }
     }
 }

@@ -20,7 +20,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use crate::plugin::launch_options::LaunchOptions;
 
 /// What our own ports are called.
-const CLIENT: &str = "Chalumeau keyboards";
+pub(super) const CLIENT: &str = "Chalumeau keyboards";
 /// In the name of the system's port that sends back what it gets.
 const THROUGH: &str = "midi through";
 

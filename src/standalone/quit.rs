@@ -1,5 +1,6 @@
-//! The end of the program on Ctrl-C and its like.
+//! The end of the program: on Ctrl-C and its like, or to start again with other devices.
 
+use std::process::{Command, ExitCode};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -10,28 +11,63 @@ use crate::plugin::launch_options::LaunchOptions;
 /// for it.
 const PATIENCE: Duration = Duration::from_millis(1_500);
 
-/// Makes Ctrl-C, and on Unix SIGTERM and SIGHUP, end the program. A window closes, and the program ends with it; otherwise
-/// the program ends here. If it is still there after [`PATIENCE`], it is ended without the sound system.
+/// Makes Ctrl-C, and on Unix SIGTERM and SIGHUP, end the program.
 ///
 /// The framework wants to catch the same signals. It comes second, and leaves them to this function.
 pub fn listen(options: &'static LaunchOptions) {
     let heard = ctrlc::set_handler(move || {
-        // Only the first signal counts.
-        if options.quit.swap(true, Ordering::Relaxed) {
-            return;
-        }
-        let _ = std::thread::Builder::new().name("QuitWatch".to_owned()).spawn(|| {
-            std::thread::sleep(PATIENCE);
-            eprintln!("chalumeau-standalone: the sound system does not let go; ended without it");
-            std::process::exit(0);
-        });
-        if !options.has_window || options.window_failed.load(Ordering::Relaxed) {
-            StandalonePlugin::end();
-            std::process::exit(0);
-        }
+        options.restart.store(false, Ordering::Relaxed);
+        begin(options);
     });
     if let Err(reason) = heard {
         // The system then ends the program at once.
         eprintln!("chalumeau-standalone: cannot catch Ctrl-C: {reason}");
     }
+}
+
+/// Begins the end. A window closes, and the program ends with it; otherwise the program ends here. If it is still there after
+/// [`PATIENCE`], it is ended without the sound system. Only the first call counts.
+pub fn begin(options: &'static LaunchOptions) {
+    if options.quit.swap(true, Ordering::Relaxed) {
+        return;
+    }
+    let _ = std::thread::Builder::new().name("QuitWatch".to_owned()).spawn(move || {
+        std::thread::sleep(PATIENCE);
+        eprintln!("chalumeau-standalone: the sound system does not let go; ended without it");
+        if options.restart.load(Ordering::Relaxed) {
+            start_again();
+        }
+        std::process::exit(0);
+    });
+    if !options.has_window || options.window_failed.load(Ordering::Relaxed) {
+        StandalonePlugin::end();
+        std::process::exit(0);
+    }
+}
+
+/// Starts the program again if the user wants it. It needs no arguments: the session and the choice of devices are kept.
+pub fn end(options: &LaunchOptions) -> ExitCode {
+    if options.restart.load(Ordering::Relaxed) { start_again() } else { ExitCode::SUCCESS }
+}
+
+/// Returns only if it has started another process, or cannot start one.
+fn start_again() -> ExitCode {
+    let path = match std::env::current_exe() {
+        Ok(path) => path,
+        Err(reason) => return cannot(&reason),
+    };
+    let mut program = Command::new(path);
+    // The same process keeps its terminal.
+    #[cfg(unix)]
+    return cannot(&std::os::unix::process::CommandExt::exec(&mut program));
+    #[cfg(not(unix))]
+    match program.spawn() {
+        Ok(_) => ExitCode::SUCCESS,
+        Err(reason) => cannot(&reason),
+    }
+}
+
+fn cannot(reason: &std::io::Error) -> ExitCode {
+    eprintln!("chalumeau-standalone: cannot start again: {reason}. The next start uses the chosen devices");
+    ExitCode::FAILURE
 }

@@ -5,6 +5,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -135,7 +136,7 @@ fn ask_for(state: &mut PluginState, options: Option<&LaunchOptions>) {
         state.params.insert("a4".to_owned(), ParamValue::F32(a4_hz));
     }
     // None is open unless the user has named one.
-    state.params.insert("mic".to_owned(), ParamValue::Bool(*microphone));
+    state.params.insert("mic".to_owned(), ParamValue::Bool(microphone.load(Ordering::Relaxed)));
 }
 
 #[cfg(test)]
@@ -167,11 +168,13 @@ mod tests {
         let options = LaunchOptions {
             instrument: Some((InstrumentChoice::User, "/a/\"b\".toml".to_owned())),
             a4_hz: Some(442.0),
-            microphone: true,
+            microphone: true.into(),
             has_window: true,
             quit: Default::default(),
+            restart: Default::default(),
             window_failed: Default::default(),
             connections: Default::default(),
+            device_tasks: Default::default(),
         };
         let (_, params) = start(&path, Some(&options));
         assert_eq!(params.embouchure.strength.value(), 3.5);

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use nice_plug::context::gui::AsyncExecutor;
 use nice_plug::prelude::*;
 
+use super::devices;
 use super::jack::JackLink;
 use super::keyboards::WithKeyboards;
 use super::session::Session;
@@ -107,6 +108,7 @@ impl Plugin for StandalonePlugin {
         if self.uses_jack {
             return ProcessStatus::KeepAlive;
         }
+        devices::count_block();
         // Nobody else holds it while the framework plays.
         match self.plugin.try_lock() {
             Ok(mut plugin) => {

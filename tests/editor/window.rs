@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use chalumeau::controllers::breath_input::BreathInput;
+use chalumeau::editor::connections::{Connections, DeviceChoice, DeviceLists, OutputChoice};
 use chalumeau::editor::controls::Controls;
 use chalumeau::editor::note_names::NoteNames;
-use chalumeau::editor::snapshot::Connections;
 use chalumeau::editor::{Action, FeelTest, Tab};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::units::SoundingNote;
@@ -628,6 +628,7 @@ fn a_program_without_a_host_says_where_its_sound_and_midi_are() {
         midi: Vec::new(),
         no_midi: "none; a keyboard plays as soon as you plug it in".to_owned(),
         how: "A patchbay connects others.".to_owned(),
+        ..Connections::default()
     });
     window.harness.run();
     window.harness.get_by_label("JACK, 48000 Hz: system:playback_1");
@@ -636,6 +637,69 @@ fn a_program_without_a_host_says_where_its_sound_and_midi_are() {
     window.snapshot.borrow_mut().connections.as_mut().unwrap().midi = vec!["KeyStep".to_owned()];
     window.harness.run();
     window.harness.get_by_label("KeyStep");
+}
+
+#[test]
+fn a_program_without_a_host_lists_devices_and_starts_again_with_those_that_are_chosen() {
+    let mut window = Window::tall(Tab::Instrument);
+    let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+    let devices = DeviceLists {
+        outputs: names(&["Card", "HDMI"]),
+        inputs: names(&["Mic"]),
+        midi_inputs: names(&["KeyStep", "EWI"]),
+    };
+    window.snapshot.borrow_mut().connections =
+        Some(Connections { devices: devices.into(), ..Connections::default() });
+    window.harness.run();
+    assert!(window.actions().contains(&Action::LookForDevices), "it looks by itself when it is first seen");
+    let choose = |window: &mut Window, list: &str, option: &str| {
+        window.harness.get_by_role_and_label(Role::ComboBox, list).click();
+        window.harness.run();
+        window.harness.get_by_role_and_label(Role::Button, option).click();
+        window.harness.run();
+    };
+    assert!(window.harness.query_by_label("Restart with these").is_none(), "nothing else is chosen");
+    choose(&mut window, "Play to", "Card");
+    choose(&mut window, "Sample rate", "44100 Hz");
+    choose(&mut window, "Samples per block", "blocks of 128");
+    choose(&mut window, "MIDI from", "EWI");
+    choose(&mut window, "Microphone", "Mic");
+    assert!(!window.actions().iter().any(|action| matches!(action, Action::UseDevices(_))), "not yet");
+    click(&mut window, "Restart with these");
+    let wanted = DeviceChoice {
+        output: OutputChoice::Device("Card".to_owned()),
+        rate_hz: 44_100,
+        block: 128,
+        microphone: Some("Mic".to_owned()),
+        midi_input: Some("EWI".to_owned()),
+    };
+    assert!(window.actions().contains(&Action::UseDevices(wanted)));
+    click(&mut window, "Cancel");
+    assert!(window.harness.query_by_label("Restart with these").is_none());
+    click(&mut window, "Look for devices again");
+    assert!(window.actions().contains(&Action::LookForDevices));
+    // A device that is not there now still stands in its list.
+    let chosen = DeviceChoice { output: OutputChoice::Device("Gone".to_owned()), ..DeviceChoice::default() };
+    window.snapshot.borrow_mut().connections.as_mut().unwrap().chosen = chosen;
+    window.harness.run();
+    let list = window.harness.get_by_role_and_label(Role::ComboBox, "Play to");
+    assert_eq!(list.accesskit_node().value().as_deref(), Some("Gone"));
+    assert!(window.harness.query_by_label("Try these again").is_none());
+    let problem = "No sound: Gone does not open.";
+    window.snapshot.borrow_mut().connections.as_mut().unwrap().problem = Some(problem.to_owned());
+    window.harness.run();
+    window.harness.get_by_label(problem);
+    click(&mut window, "Try these again");
+    let again = DeviceChoice { output: OutputChoice::Device("Gone".to_owned()), ..DeviceChoice::default() };
+    assert!(window.actions().contains(&Action::UseDevices(again)), "it may be there by now");
+    // JACK has rates and connections of its own.
+    choose(&mut window, "Play to", "The system's output");
+    window.harness.get_by_role_and_label(Role::ComboBox, "Sample rate");
+    let jack = DeviceChoice { output: OutputChoice::Jack, ..DeviceChoice::default() };
+    click(&mut window, "Cancel");
+    window.snapshot.borrow_mut().connections.as_mut().unwrap().chosen = jack;
+    window.harness.run();
+    assert!(window.harness.query_by_label("Sample rate").is_none());
 }
 
 #[test]

@@ -25,7 +25,7 @@ pub struct MicrophoneParams {
 impl MicrophoneParams {
     /// The table's parameters. The standalone switches the microphone on and measures the room where the user has named one.
     pub(super) fn new(moments: &Arc<Moments>) -> Self {
-        let is_named = LaunchOptions::get().is_some_and(|options| options.microphone);
+        let is_named = LaunchOptions::get().is_some_and(|options| options.microphone.load(Ordering::Relaxed));
         if is_named {
             moments.press(Moment::Calibrate);
         }

@@ -14,7 +14,7 @@ use super::size_watch::{Seen, SizeWatch};
 use super::{SharedWindow, kept, screen};
 use crate::editor::{self, Action, Controls, EditorState, Snapshot, WindowState};
 use crate::plugin::SharedHandles;
-use crate::plugin::launch_options::LaunchOptions;
+use crate::plugin::launch_options::{DeviceTask, LaunchOptions};
 use crate::plugin::params::ChalumeauParams;
 use crate::plugin::params::instrument::InstrumentChoice;
 use crate::plugin::params::scale::SavedScale;
@@ -128,6 +128,8 @@ impl WindowMemory {
                 self.handles.params.host.state_changed();
             }
             Action::ChosePreset(name) => self.handles.params.set_preset_name(&name),
+            Action::LookForDevices => LaunchOptions::ask(DeviceTask::Look),
+            Action::UseDevices(choice) => LaunchOptions::ask(DeviceTask::Use(choice)),
             Action::ReadPresets => self.handles.presets.send(PresetTask::Read),
             Action::SavePreset(preset) => self.handles.presets.send(PresetTask::Save(preset)),
             Action::RenamePreset { old, new } => {

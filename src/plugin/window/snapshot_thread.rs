@@ -149,6 +149,10 @@ impl SnapshotThread {
         let is_looking = matches!(snapshot.fingerings, FingeringSearch::Looking(_));
         snapshot.status = self.status(current.as_ref(), &inside);
         snapshot.connections = LaunchOptions::connections();
+        if let Some(problem) = snapshot.connections.as_ref().and_then(|now| now.problem.clone()) {
+            // Before all others: nobody hears anything.
+            snapshot.status.insert(0, Status { level: Severity::Warn, text: problem });
+        }
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();
         let is_moving = is_looking

@@ -1,0 +1,130 @@
+//! Where sound and MIDI go and come from, in a program without a host, and lists to choose others.
+
+use egui::{RichText, Role, Ui, WidgetInfo};
+
+use crate::editor::Action;
+use crate::editor::connections::{BLOCKS, Connections, DeviceChoice, OutputChoice, RATES_HZ};
+use crate::editor::controls::heading;
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+
+/// What the user has chosen and not yet used, and whether the program has been asked for the devices.
+#[derive(Clone, Default)]
+struct Draft {
+    choice: Option<DeviceChoice>,
+    has_asked: bool,
+}
+
+/// Draws them.
+pub fn draw(ui: &mut Ui, connections: &Connections, actions: &mut Vec<Action>) {
+    let c = Colours::here(ui);
+    let id = ui.scope_id().with("devices");
+    let mut draft: Draft = ui.data(|data| data.get_temp(id)).unwrap_or_default();
+    if !std::mem::replace(&mut draft.has_asked, true) {
+        actions.push(Action::LookForDevices);
+    }
+    heading(ui, concat!("Chalumeau ", env!("CARGO_PKG_VERSION")));
+    let chosen = &connections.chosen;
+    let devices = &connections.devices;
+    let mut choice = draft.choice.take().unwrap_or_else(|| chosen.clone());
+    let quiet = |text: &str| RichText::new(text).color(c.quiet);
+    let named = |ui: &mut Ui, name: &str, now: &str| {
+        ui.label(quiet(name));
+        ui.label(now);
+    };
+
+    named(ui, "Sound output", &connections.sound);
+    let mut outputs = vec![OutputChoice::Auto, OutputChoice::System];
+    // On other systems hardly anyone has it.
+    if cfg!(target_os = "linux") || chosen.output == OutputChoice::Jack {
+        outputs.insert(1, OutputChoice::Jack);
+    }
+    outputs.extend(devices.outputs.iter().cloned().map(OutputChoice::Device));
+    let tip = "Automatic is JACK if a server runs, and otherwise the system's output.";
+    list(ui, "Play to", &mut choice.output, outputs, |output| output.title().to_owned(), tip);
+    let is_jack = choice.output == OutputChoice::Jack;
+    if !is_jack {
+        ui.horizontal(|ui| {
+            let half = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
+            let tip = "Samples in a second. JACK sets its own.";
+            ui.scope(|ui| {
+                ui.set_max_width(half);
+                list(ui, "Sample rate", &mut choice.rate_hz, RATES_HZ, |rate_hz| format!("{rate_hz} Hz"), tip);
+            });
+            let tip = "Samples in a block. Small blocks respond faster, but the sound may drop out. JACK sets its own.";
+            let text = |block: &u32| format!("blocks of {block}");
+            list(ui, "Samples per block", &mut choice.block, BLOCKS, text, tip);
+        });
+    }
+    named(ui, "MIDI inputs", &connections.midi_line());
+    if !is_jack {
+        let inputs = std::iter::once(None).chain(devices.midi_inputs.iter().cloned().map(Some));
+        let text = |input: &Option<String>| input.clone().unwrap_or_else(|| "All MIDI inputs".to_owned());
+        list(ui, "MIDI from", &mut choice.midi_input, inputs, text, "With JACK, all inputs play.");
+        ui.label(quiet("Microphone to blow at"));
+        let inputs = std::iter::once(None).chain(devices.inputs.iter().cloned().map(Some));
+        let text = |input: &Option<String>| input.clone().unwrap_or_else(|| "None".to_owned());
+        let tip = "With JACK, connect the port \"microphone\" in a patchbay.";
+        list(ui, "Microphone", &mut choice.microphone, inputs, text, tip);
+    }
+    if let Some(problem) = &connections.problem {
+        ui.label(RichText::new(problem).color(ui.visuals().warn_fg_color));
+    }
+    if choice == *chosen {
+        if ui.button("Look for devices again").clicked() {
+            actions.push(Action::LookForDevices);
+        }
+        // It may be plugged in by now.
+        if connections.problem.is_some() && ui.button("Try these again").clicked() {
+            actions.push(Action::UseDevices(choice.clone()));
+        }
+    } else {
+        ui.horizontal(|ui| {
+            let about =
+                "The program starts again, with your settings and these devices. Later starts use them, too.";
+            let button =
+                egui::Button::new(RichText::new("Restart with these").color(c.on_accent)).fill(c.accent);
+            if ui.add(button).on_hover_text(about).clicked() {
+                actions.push(Action::UseDevices(choice.clone()));
+            }
+            if ui.button("Cancel").clicked() {
+                choice = chosen.clone();
+            }
+        });
+    }
+    if !connections.how.is_empty() {
+        ui.label(quiet(&connections.how).font(theme::small()));
+    }
+    draft.choice = (choice != *chosen).then_some(choice);
+    ui.data_mut(|data| data.insert_temp(id, draft));
+}
+
+/// A list to open. What is chosen stands in it, even if it is not there now.
+fn list<T: Clone + PartialEq>(
+    ui: &mut Ui,
+    name: &str,
+    chosen: &mut T,
+    options: impl IntoIterator<Item = T>,
+    text: impl Fn(&T) -> String,
+    tip: &str,
+) {
+    let mut options: Vec<T> = options.into_iter().collect();
+    if !options.contains(chosen) {
+        options.push(chosen.clone());
+    }
+    let now = text(chosen);
+    let list =
+        egui::ComboBox::from_id_salt(name).width(ui.available_width() - 8.0).truncate().selected_text(&now);
+    let response = list.show_ui(ui, |ui| {
+        for option in options {
+            let text = text(&option);
+            ui.selectable_value(chosen, option, text);
+        }
+    });
+    response.response.widget_info(|| {
+        let mut info = WidgetInfo::labeled(Role::ComboBox, true, name);
+        info.current_text_value = Some(now.clone());
+        info
+    });
+    response.response.on_hover_text(tip);
+}

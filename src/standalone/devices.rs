@@ -1,0 +1,177 @@
+//! The devices for sound and MIDI: lists them for the window, keeps the user's choice, and watches whether the output still
+//! asks for sound.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+use cpal::traits::{DeviceTrait, HostTrait};
+use midir::MidiInput;
+
+use super::keyboards;
+use super::quit;
+use crate::data_folder;
+use crate::editor::connections::{DeviceChoice, DeviceLists};
+use crate::output;
+use crate::plugin::launch_options::{DeviceTask, LaunchOptions};
+
+const FILE: &str = "devices.json";
+
+/// How often the thread looks whether sound is asked for.
+const LOOK: Duration = Duration::from_millis(500);
+
+/// An output that has asked for nothing during this time has stopped.
+const STOPPED: Duration = Duration::from_secs(3);
+
+/// Blocks that the output has asked for.
+static BLOCKS: AtomicU32 = AtomicU32::new(0);
+
+/// The output asks for a block. Real-time safe. [audio thread]
+pub fn count_block() {
+    BLOCKS.fetch_add(1, Ordering::Relaxed);
+}
+
+fn path() -> Option<PathBuf> {
+    data_folder::folder().map(|folder| folder.join(FILE))
+}
+
+/// What the user has chosen in the window, in this or an earlier session.
+pub fn kept() -> DeviceChoice {
+    let Some(bytes) = path().and_then(|path| std::fs::read(path).ok()) else {
+        return DeviceChoice::default();
+    };
+    serde_json::from_slice(&bytes).unwrap_or_else(|reason| {
+        eprintln!("chalumeau-standalone: cannot read {FILE}: {reason}; sound goes to the default output");
+        DeviceChoice::default()
+    })
+}
+
+fn keep(choice: &DeviceChoice) -> Result<(), String> {
+    let path = path().ok_or("this system has no folder for settings")?;
+    let bytes = serde_json::to_vec_pretty(choice).map_err(|reason| reason.to_string())?;
+    output::replace(&path, &bytes).map_err(|reason| reason.to_string())
+}
+
+/// Does what the window asks for, until the program ends.
+pub fn serve(options: &'static LaunchOptions) {
+    let (tasks, asked) = channel();
+    *options.device_tasks.lock().unwrap_or_else(PoisonError::into_inner) = Some(tasks);
+    let serve = move || {
+        let mut watch = Watch::new(Instant::now());
+        loop {
+            match asked.recv_timeout(LOOK) {
+                Ok(DeviceTask::Look) => {
+                    let devices = Arc::new(lists());
+                    LaunchOptions::connect(|now| now.devices = devices);
+                }
+                Ok(DeviceTask::Use(choice)) => match keep(&choice) {
+                    Ok(()) => {
+                        options.restart.store(true, Ordering::Relaxed);
+                        quit::begin(options);
+                    }
+                    Err(reason) => {
+                        LaunchOptions::connect(|now| {
+                            now.problem = Some(format!("The choice of devices cannot be saved: {reason}"));
+                        });
+                    }
+                },
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            if watch.has_just_stopped(BLOCKS.load(Ordering::Relaxed), Instant::now()) {
+                let problem = "The sound output has stopped. Choose one in the Instrument view.";
+                eprintln!("chalumeau-standalone: {problem}");
+                LaunchOptions::connect(|now| now.problem = Some(problem.to_owned()));
+            }
+        }
+    };
+    // Without the thread, the lists stay empty.
+    let _ = std::thread::Builder::new().name("devices".to_owned()).spawn(serve);
+}
+
+/// Notices that nobody asks for blocks any more.
+struct Watch {
+    blocks: u32,
+    /// When the last one was asked for.
+    at: Instant,
+    has_stopped: bool,
+}
+
+impl Watch {
+    fn new(now: Instant) -> Self {
+        Self { blocks: 0, at: now, has_stopped: false }
+    }
+
+    /// Whether the output has stopped since the last look. One that has not begun yet has not stopped.
+    fn has_just_stopped(&mut self, blocks: u32, now: Instant) -> bool {
+        if blocks != self.blocks || blocks == 0 {
+            *self = Self { blocks, at: now, has_stopped: false };
+            return false;
+        }
+        now.duration_since(self.at) > STOPPED && !std::mem::replace(&mut self.has_stopped, true)
+    }
+}
+
+/// The devices that there are.
+fn lists() -> DeviceLists {
+    let host = cpal::default_host();
+    let name = |device: cpal::Device| device.description().ok().map(|about| about.name().to_owned());
+    let outputs = host.output_devices().map(|all| all.filter_map(name).collect()).unwrap_or_default();
+    let inputs = host.input_devices().map(|all| all.filter_map(name).collect()).unwrap_or_default();
+    DeviceLists {
+        outputs: without_doubles(outputs),
+        inputs: without_doubles(inputs),
+        midi_inputs: without_doubles(midi_inputs()),
+    }
+}
+
+fn midi_inputs() -> Vec<String> {
+    let Ok(list) = MidiInput::new(keyboards::CLIENT) else { return Vec::new() };
+    let names = list.ports().into_iter().filter_map(|port| list.port_name(&port).ok());
+    names
+        .filter(|name| keyboards::plays_unasked([name.as_str()]) && !name.contains(keyboards::CLIENT))
+        .collect()
+}
+
+/// The framework opens the first device of a name.
+fn without_doubles(names: Vec<String>) -> Vec<String> {
+    let mut seen = std::collections::HashSet::new();
+    names.into_iter().filter(|name| seen.insert(name.clone())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::editor::connections::OutputChoice;
+
+    #[test]
+    fn an_output_that_asks_no_more_has_stopped_once() {
+        let began = Instant::now();
+        let after = |s: u64| began + Duration::from_secs(s);
+        let mut watch = Watch::new(began);
+        assert!(!watch.has_just_stopped(0, after(60)), "it has not begun");
+        assert!(!watch.has_just_stopped(1, after(61)));
+        assert!(!watch.has_just_stopped(1, after(63)), "a busy machine");
+        assert!(watch.has_just_stopped(1, after(65)));
+        assert!(!watch.has_just_stopped(1, after(70)), "said already");
+        assert!(!watch.has_just_stopped(2, after(71)), "it goes on");
+        assert!(watch.has_just_stopped(2, after(75)));
+    }
+
+    #[test]
+    fn a_choice_of_an_earlier_version_is_read() {
+        let choice: DeviceChoice = serde_json::from_str(r#"{"output": {"device": "Scarlett"}}"#).unwrap();
+        assert_eq!(choice.output, OutputChoice::Device("Scarlett".to_owned()));
+        assert_eq!((choice.rate_hz, choice.block), (48_000, 256));
+        let again: DeviceChoice = serde_json::from_slice(&serde_json::to_vec(&choice).unwrap()).unwrap();
+        assert_eq!(again, choice);
+    }
+
+    #[test]
+    fn a_name_is_listed_once() {
+        let names = ["HDMI", "Analog", "HDMI"].map(str::to_owned).to_vec();
+        assert_eq!(without_doubles(names), ["HDMI", "Analog"]);
+    }
+}
