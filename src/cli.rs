@@ -84,11 +84,11 @@ Examples:
   chalumeau tune --rate 48000 --gamma 0.5
   chalumeau haptic --all --contrast 1
 
-Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads
-*written* notes, which sound two semitones lower. Mouth pressure is given as gamma: the pressure
-in the mouth over the pressure that shuts the reed. Notes begin between 0.30 and 0.41; between 0.5
-and 0.7 the reed begins to beat against the lay; at 1 a resting reed with a sharp facing (--lay 0) would be
-shut, on a curved one somewhat later; well above, the note chokes. Or it is given as a dynamic: --dynamic pp to ff, as a player plays.";
+Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads *written* notes, which \
+sound two semitones lower. Mouth pressure is given as gamma: the pressure in the mouth over the pressure that shuts \
+the reed. Notes begin between 0.30 and 0.41; between 0.5 and 0.7 the reed begins to beat against the lay; at 1 a \
+resting reed with a sharp facing (--lay 0) would be shut, on a curved one somewhat later; well above, the note \
+chokes. Or it is given as a dynamic: --dynamic pp to ff, as a player plays.";
 
 /// A clarinet you play by touch: reed, bore with real tone holes, sound.
 #[derive(Parser)]

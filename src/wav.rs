@@ -42,7 +42,15 @@ pub struct Levels {
     pub rms: f32,
     /// Number of samples clipped at full scale, of all channels; 0 for floats.
     pub clipped: u64,
+    /// Root mean square of the loudest [`WINDOW_S`] after [`BEGINNING_S`], full scale 1; `None` if the file ends before.
+    pub after_beginning: Option<f32>,
 }
+
+/// Time that the tongue's puff and what rings after it may take, s.
+pub const BEGINNING_S: f64 = 0.5;
+
+/// Time over which the level after the beginning is averaged, s: several periods of the lowest note.
+const WINDOW_S: f64 = 0.05;
 
 /// A WAV file that is being written.
 pub struct WavFile<W: Write + Seek> {
@@ -52,6 +60,9 @@ pub struct WavFile<W: Write + Seek> {
     level: Levels,
     /// Sum of the squares, and how many.
     power: (f64, u64),
+    /// The same for the window that goes on, which begins after the beginning.
+    window: (f64, u64),
+    rate: u32,
 }
 
 impl<W: Write + Seek> WavFile<W> {
@@ -71,7 +82,15 @@ impl<W: Write + Seek> WavFile<W> {
         }
         let spec = WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format };
         let writer = WavWriter::new(BufWriter::new(file), spec)?;
-        Ok(Self { writer, depth, channels, level: Levels::default(), power: (0.0, 0) })
+        Ok(Self {
+            writer,
+            depth,
+            channels,
+            level: Levels::default(),
+            power: (0.0, 0),
+            window: (0.0, 0),
+            rate,
+        })
     }
 
     /// Appends one block: a mono sound, which goes to every channel, or the channels.
@@ -80,7 +99,9 @@ impl<W: Write + Seek> WavFile<W> {
             for channel in 0..usize::from(self.channels) {
                 let sample = block.get(channel).map_or(first, |samples| samples[at]);
                 self.level.peak = self.level.peak.max(sample.abs());
-                self.power = (self.power.0 + f64::from(sample).powi(2), self.power.1 + 1);
+                let square = f64::from(sample).powi(2);
+                self.power = (self.power.0 + square, self.power.1 + 1);
+                self.look_after_beginning(square);
                 match self.depth {
                     Depth::Int16 => self.writer.write_sample(round(sample, 32_767.0))?,
                     Depth::Int24 => self.writer.write_sample(round(sample, 8_388_607.0))?,
@@ -90,6 +111,21 @@ impl<W: Write + Seek> WavFile<W> {
             }
         }
         Ok(())
+    }
+
+    /// Takes in the square of a sample.
+    fn look_after_beginning(&mut self, square: f64) {
+        let in_one_s = f64::from(self.rate) * f64::from(self.channels);
+        if (self.power.1 as f64) < BEGINNING_S * in_one_s {
+            return;
+        }
+        self.window = (self.window.0 + square, self.window.1 + 1);
+        if self.window.1 as f64 >= WINDOW_S * in_one_s {
+            let rms = (self.window.0 / self.window.1 as f64).sqrt() as f32;
+            self.level.after_beginning =
+                Some(self.level.after_beginning.map_or(rms, |loudest| loudest.max(rms)));
+            self.window = (0.0, 0);
+        }
     }
 
     /// Completes the header.
@@ -164,6 +200,22 @@ mod tests {
         let mut reader = hound::WavReader::open(&path).unwrap();
         let samples: Vec<f32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [0.1, 0.3, 0.2, -0.4]);
+    }
+
+    #[test]
+    fn the_level_after_the_beginning_is_that_of_its_loudest_part() {
+        let directory = tempfile::tempdir().unwrap();
+        let levels = |seconds: f64, sound: &dyn Fn(f64) -> f32| {
+            let mut file = NewFile::create(&directory.path().join("x.wav"), true).unwrap();
+            let samples: Vec<f32> =
+                (0..(1e3 * seconds) as u32).map(|ms| sound(f64::from(ms) / 1e3)).collect();
+            let mut wav = WavFile::new(&mut file, 1_000, Depth::Float32, 2, samples.len()).unwrap();
+            wav.write(&[&samples]).unwrap();
+            wav.finish().unwrap().after_beginning
+        };
+        assert_eq!(levels(0.5, &|_| 0.5), None);
+        assert_eq!(levels(2.0, &|s| if s < BEGINNING_S { 0.5 } else { 0.0 }), Some(0.0));
+        assert_eq!(levels(2.0, &|s| if s < 1.0 { 0.5 } else { 0.25 }), Some(0.5));
     }
 
     #[test]

@@ -44,8 +44,9 @@ A plan is a TOML file. [same] is for every file; of [vary] every combination is 
   written = [\"E3\", \"C4\", \"G4\"]
   gamma = { from = 0.4, to = 0.6, steps = 5 }
   zeta = [0.2, 0.3]
-Names are flags of `chalumeau render` without their dashes, or ids of `chalumeau parameters`; a MIDI file is midi = \"melody.mid\".
-A CSV file has the names in its first line, and one file to render in each other line; an empty field leaves its name out.";
+Names are flags of `chalumeau render` without their dashes, or ids of `chalumeau parameters`; a MIDI file is midi = \
+\"melody.mid\". A CSV file has the names in its first line, and one file to render in each other line; an empty field \
+leaves its name out.";
 
 /// Render many variations into a folder, with a table of what each file is
 ///

@@ -6,6 +6,11 @@ use chalumeau_core::dsp::limiter::CEILING;
 /// A peak from here on was turned down: the limiter lets none past its ceiling, and hardly any by chance come as near.
 const LIMITED: f32 = 0.999 * CEILING;
 
+/// What is softer than both is no tone after the tongue's puff: the level over the peak, and the level over full scale. The air of written
+/// C4, C5 and E5 a little below their thresholds lies 28 to 34 dB under the puff and 55 to 58 under full scale; the softest notes
+/// lie 5 to 8 under it and 37 under full scale.
+const NO_TONE: [f32; 2] = [0.08, 4e-3];
+
 /// One reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Doubt {
@@ -15,6 +20,8 @@ pub enum Doubt {
     Limited,
     /// The calculation broke down.
     Reset,
+    /// After the beginning there is hardly any sound.
+    NoTone,
 }
 
 impl Doubt {
@@ -24,6 +31,10 @@ impl Doubt {
             (Self::Clipped, level.clipped > 0),
             (Self::Limited, level.peak >= LIMITED),
             (Self::Reset, resets > 0),
+            (
+                Self::NoTone,
+                level.after_beginning.is_some_and(|rms| rms < (NO_TONE[0] * level.peak).min(NO_TONE[1])),
+            ),
         ];
         all.into_iter().filter_map(|(doubt, is_so)| is_so.then_some(doubt))
     }
@@ -34,6 +45,37 @@ impl Doubt {
             Self::Clipped => "samples clipped; lower gain-db, or set bits to 32f",
             Self::Limited => "the limiter turned peaks down; lower gain-db for levels as played",
             Self::Reset => "the calculation broke down and the instrument was reset; please report this",
+            Self::NoTone => {
+                "after 0.5 s there is no tone: the breath is too weak for the note, or so strong that the reed stays shut"
+            }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_with_nothing_but_the_tongues_puff_has_no_tone() {
+        let has_tone = |peak: f32, after_beginning: Option<f32>| {
+            let level = Levels { peak, after_beginning, ..Levels::default() };
+            !Doubt::all(level, 0).any(|doubt| doubt == Doubt::NoTone)
+        };
+        // Measured: C4 at gamma 1.8, C4 at 0.34, E5 at gamma 0.4 and zeta 0.2; E3 and C6 at pianissimo.
+        for (peak_db, after_db) in [(-26.4, -220.0), (-26.7, -54.9), (-27.5, -57.6)] {
+            assert!(!has_tone(gain(peak_db), Some(gain(after_db))), "{peak_db}, {after_db}");
+        }
+        for (peak_db, after_db) in [(-29.0, -36.8), (-30.6, -35.6)] {
+            assert!(has_tone(gain(peak_db), Some(gain(after_db))), "{peak_db}, {after_db}");
+            assert!(has_tone(gain(peak_db - 40.0), Some(gain(after_db - 40.0))), "with less gain");
+        }
+        assert!(has_tone(0.5, Some(gain(-45.0))), "a loud beginning, then pianissimo");
+        assert!(has_tone(0.5, None), "a short file");
+        assert!(has_tone(0.0, Some(0.0)), "a silent file is said to be silent");
+    }
+
+    fn gain(db: f32) -> f32 {
+        10_f32.powf(db / 20.0)
     }
 }

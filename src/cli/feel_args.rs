@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::shared_args::{check_fingering, note, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::haptics::{FeelDesign, NoteOrder};
+use chalumeau_core::haptics::{FeelDesign, FeelRefused, NoteOrder};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::wire::message::TorqueLaw;
 use clap::{Args, ValueEnum};
@@ -123,10 +123,60 @@ impl FeelArgs {
         self.torque.is_none()
     }
 
+    /// This feel as flags, for a file that is read later.
+    #[cfg(feature = "devices")]
+    pub fn in_flags(&self, design: &FeelDesign) -> String {
+        let value = |arg: Option<clap::builder::PossibleValue>| {
+            arg.map_or_else(String::new, |arg| arg.get_name().to_owned())
+        };
+        let mut flags = format!(
+            "--law {} --contrast {} --place {} --order {} --torque {} --travel {} --detent {}",
+            value(self.law.unwrap_or(LawArg::Flow).to_possible_value()),
+            design.contrast,
+            design.place,
+            value(self.order.unwrap_or(OrderArg::Physical).to_possible_value()),
+            design.strength_mnm,
+            design.travel_deg,
+            design.mark_mnm(),
+        );
+        if let Some(reference) = design.reference {
+            flags += &format!(" --reference {reference}");
+        }
+        if design.equal_travel {
+            flags += " --equal-travel";
+        }
+        flags
+    }
+
     /// Contrast and Place in words.
     pub fn exaggeration(&self) -> String {
         format!("Contrast {}, Place {}", self.contrast(), self.place())
     }
+}
+
+/// What is refused, with what helps as flags. `ceiling` is the flag that allows more torque.
+pub fn refused_in_flags(refused: FeelRefused, ceiling: &str) -> Failure {
+    let helps = match &refused {
+        FeelRefused::Silent { .. } => "raise --zeta or --H".to_owned(),
+        FeelRefused::Reference(_) => "choose another --reference".to_owned(),
+        FeelRefused::Travel { .. } => "shorten --travel".to_owned(),
+        FeelRefused::Crossed { .. } => "lower --place, raise --zeta, or take --law flow".to_owned(),
+        FeelRefused::Ceiling { strength_mnm: 0.0, .. } => {
+            format!("lower the mark (--detent), or raise {ceiling}")
+        }
+        FeelRefused::Ceiling { strength_mnm, .. } => {
+            format!(
+                "lower the strength (--torque) to {strength_mnm:.0} mNm or less, lower --contrast, or raise {ceiling}"
+            )
+        }
+        FeelRefused::Stiffness { .. } => "lower the strength (--torque), or lengthen --travel".to_owned(),
+        FeelRefused::Push { .. } => {
+            "lower the mark (--detent) or the strength (--torque), lengthen --travel, or take --law pressure"
+                .to_owned()
+        }
+        _ => return refused.into(),
+    };
+    Failure::Usage(format!("{}; {helps}", refused.reason()))
 }
 
 #[cfg(test)]

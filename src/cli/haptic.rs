@@ -2,13 +2,13 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, number};
-use crate::cli::feel_args::FeelArgs;
+use crate::cli::feel_args::{FeelArgs, refused_in_flags};
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::feel_parameters::HARD_CEILING_MNM;
 use chalumeau_core::haptics::torque_law;
 use chalumeau_core::haptics::{
-    FeelRefused, FeelTable, NoteFeel, NoteRequirement, PlayedReed, RequirementSolver, TorqueLimits,
+    FeelTable, NoteFeel, NoteRequirement, PlayedReed, RequirementSolver, TorqueLimits,
 };
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
@@ -123,7 +123,8 @@ impl FeltReedArgs {
         let design = self.feel.design(file)?;
         let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
         let (bore, reed) = self.bore_and_reed(file)?;
-        FeelTable::new(&bore, &design, &reed, &limits).map_err(in_flags)
+        FeelTable::new(&bore, &design, &reed, &limits)
+            .map_err(|refused| refused_in_flags(refused, "--ceiling"))
     }
 }
 
@@ -198,29 +199,4 @@ impl HapticCommand {
         }
         table.finish()
     }
-}
-
-/// What is refused, with what helps as flags of this command.
-fn in_flags(refused: FeelRefused) -> Failure {
-    let helps = match &refused {
-        FeelRefused::Silent { .. } => "raise --zeta or --H".to_owned(),
-        FeelRefused::Reference(_) => "choose another --reference".to_owned(),
-        FeelRefused::Travel { .. } => "shorten --travel".to_owned(),
-        FeelRefused::Crossed { .. } => "lower --place, raise --zeta, or take --law flow".to_owned(),
-        FeelRefused::Ceiling { strength_mnm: 0.0, .. } => {
-            "lower the mark (--detent), or raise --ceiling".to_owned()
-        }
-        FeelRefused::Ceiling { strength_mnm, .. } => {
-            format!(
-                "lower the strength (--torque) to {strength_mnm:.0} mNm or less, lower --contrast, or raise --ceiling"
-            )
-        }
-        FeelRefused::Stiffness { .. } => "lower the strength (--torque), or lengthen --travel".to_owned(),
-        FeelRefused::Push { .. } => {
-            "lower the mark (--detent) or the strength (--torque), lengthen --travel, or take --law pressure"
-                .to_owned()
-        }
-        _ => return refused.into(),
-    };
-    Failure::Usage(format!("{}; {helps}", refused.reason()))
 }

@@ -1,6 +1,6 @@
 //! `chalumeau knob`: uses a knob without a DAW: watch it, feel a note on it, record a take.
 
-use crate::cli::feel_args::FeelArgs;
+use crate::cli::feel_args::{FeelArgs, refused_in_flags};
 use crate::cli::files;
 use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::cli::{Failure, INTERRUPTED};
@@ -11,7 +11,7 @@ use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::{
     FIRST_CEILING_MNM, HARD_CEILING_MNM, Hooks, KnobChoice, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase,
-    Release, StateSample,
+    Release, StateSample, serial_text,
 };
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
@@ -120,7 +120,7 @@ impl WantedFeel {
                 {
                     design.strength_mnm = strength_mnm;
                 }
-                Err(refused) => return Err(refused.into()),
+                Err(refused) => return Err(refused_in_flags(refused, "--arm")),
             }
         }
     }
@@ -143,8 +143,12 @@ impl KnobCommand {
         self.ask_again()?;
         let take = match &self.record {
             Some(path) => {
-                let remarks =
-                    [format!("written {} of {}, asked for {:?}", written.0, file.name, wanted.design)];
+                let remarks = [format!(
+                    "{written} (written {}) of {}, felt with {}",
+                    written.0,
+                    file.name,
+                    self.feel.in_flags(&wanted.design)
+                )];
                 Some(TakeFile::create(path, self.force, &remarks)?)
             }
             None => None,
@@ -294,11 +298,14 @@ impl KnobCommand {
                 }
             }
             if live_since.is_none() && began.elapsed() > PATIENCE {
-                return Err(Failure::Usage(format!(
-                    "no knob after {} s: {}",
-                    PATIENCE.as_secs(),
-                    status.text
-                )));
+                let why = match (&status.phase, self.serial) {
+                    (Phase::Searching, Some(serial)) => format!(
+                        "none with the serial number {} is there; without --serial, the first that answers is used",
+                        serial_text(serial)
+                    ),
+                    _ => status.text.clone(),
+                };
+                return Err(Failure::Usage(format!("no knob after {} s: {why}", PATIENCE.as_secs())));
             }
             for state in heard.try_iter() {
                 let gamma = note.map.pressure_pa(f64::from(state.angle_deg)) / closing_pa;

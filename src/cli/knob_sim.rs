@@ -35,10 +35,9 @@ Examples:
   chalumeau knob-sim --osc 127.0.0.1:8000 --slap --loop the stock firmware
   chalumeau knob-sim --path COM6                        one end of a pair of ports, as com0com makes on Windows
 
-The first line of standard output says where the knob is: `serial /dev/pts/7`, `midi NAME` or
-`osc HOST:PORT`; a new `serial` line follows when an unplugged cable is put back.
-Faults are KIND@AT[:SECONDS[=STRENGTH]]: drop, corrupt, duplicate, delay, reboot, stall, unplug,
-i2c, brownout, overspeed.";
+The first line of standard output says where the knob is: `serial /dev/pts/7`, `midi NAME` or `osc HOST:PORT`; a new \
+`serial` line follows when an unplugged cable is put back. Faults are KIND@AT[:SECONDS[=STRENGTH]]: drop, corrupt, \
+duplicate, delay, reboot, stall, unplug, i2c, brownout, overspeed.";
 
 /// What the knob calls itself.
 const NAME: &str = "TorqueTuner sim";

@@ -14,8 +14,8 @@ pub struct PlotArgs {
     /// Also draw a figure: a new .png or .svg file, or .json for its data
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Size of the figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]. In a smaller size than
-    /// its own all words shrink along
+    /// Size of the figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]. In a smaller figure,
+    /// its text is smaller, too
     #[arg(long, value_name = "WxH", requires = "plot")]
     plot_size: Option<Size>,
 }

@@ -44,8 +44,8 @@ Examples:
   chalumeau realism --shelf 4000,2
       As a microphone in front may hear it.
 
-The recordings are TinySOL's (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020, CC BY 4.0): one player, one take for
-each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 4.8 dB at pp, mf and ff.";
+The recordings are TinySOL's (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020, CC BY 4.0): one player, one take \
+for each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 4.8 dB at pp, mf and ff.";
 
 /// Play the recorded notes and measure how near they come to the recordings
 ///

@@ -117,10 +117,11 @@ pub struct ReedCommand {
     /// Amplitude A of the flow, 0..10 [default: 1]
     #[arg(long = "A", value_name = "A", conflicts_with_all = ["table", "figure"], value_parser = |s: &str| within(s, 0.0, 10.0))]
     a: Option<f64>,
-    #[command(flatten)]
-    measured: PhysicalReedArgs,
+    // Before those under a heading, which would be its own, too.
     #[command(flatten)]
     table_args: TableArgs,
+    #[command(flatten)]
+    measured: PhysicalReedArgs,
     #[command(flatten)]
     drawing: Drawing,
 }

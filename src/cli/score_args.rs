@@ -49,6 +49,9 @@ const INERTIA_LEAST: f64 = 0.8;
 /// Gamma at which every note of a clarinet has begun, also under a firm lip (`chalumeau threshold --zeta 0.15`: 0.54 at most, less a fifth).
 const ALL_BEGIN: f64 = 0.5;
 
+/// By so much a take may be shorter than the piece without a word, s: the last note fades.
+const SHORT_TAKE_S: f64 = 1.0;
+
 /// What to play, on what, and how.
 #[derive(Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["midi", "written", "sounding", "scale"]))]
@@ -74,8 +77,8 @@ pub struct ScoreArgs {
     /// One note by its sounding pitch
     #[arg(long, value_name = "NOTE", value_parser = note)]
     sounding: Option<u8>,
-    /// Chromatic scale between two written notes, up or down, for example E3:C6; notes that the instrument does not have are
-    /// left out
+    /// Chromatic scale between two written notes of the instrument, up or down, for example E3:C6; notes between them that it
+    /// does not have are left out
     #[arg(long, value_name = "FROM:TO", value_parser = interval)]
     scale: Option<(u8, u8)>,
     /// Slur the scale instead of tonguing each note
@@ -221,6 +224,13 @@ impl ScoreArgs {
         }
         warnings.extend(silent_notes(&parts.events, &unplayed, &model, settings.reach));
         if let Some(take) = &take {
+            let piece_s = parts.samples as f64 / f64::from(self.rate);
+            if take.seconds() + SHORT_TAKE_S < piece_s {
+                warnings.push(format!(
+                    "the take ends after {:.1} s, and the piece after {piece_s:.1} s: the knob stays where the take leaves it",
+                    take.seconds()
+                ));
+            }
             parts.events = self.replayed(take, &model, &settings, &parts)?;
         }
         // A single note lasts as long as was asked; a melody gets time to fade.
@@ -473,7 +483,7 @@ fn left_out_of_scale(ends: (u8, u8), file: &InstrumentFile) -> Option<String> {
     let (_, missing) = scale_of_chart(ends, file);
     let names: Vec<_> = missing.iter().map(WrittenNote::to_string).collect();
     (!names.is_empty())
-        .then(|| format!("this instrument has no {}; the scale leaves them out", names.join(" ")))
+        .then(|| format!("the scale leaves out what this instrument does not have: {}", names.join(" ")))
 }
 
 /// Why a piece cannot be read; who gives the name of a note means one note.

@@ -282,7 +282,9 @@ fn say_how_it_is_scaled(model: &Model, wanted: &Wanted) {
     let longer = 100.0 * (model.scale / own_scale - 1.0);
     if longer != 0.0 {
         let (by, how) = (longer.abs(), if longer > 0.0 { "larger" } else { "smaller" });
-        say!("note: the whole instrument is played {by:.2} % {how} than measured, to be in tune");
+        say!(
+            "note: the whole instrument is played {by:.2} % {how} than measured, to be in tune (--untuned plays it as measured)"
+        );
     }
 }
 
@@ -294,8 +296,8 @@ fn say_what_tuning_found(model: &Model) {
     };
     for (one, several, notes) in [
         (
-            "sounds in its register at one pressure of five or at none: its key is silent, and it has the tuning of its neighbours",
-            "sound in their register at one pressure of five or at none: their keys are silent, and they have the tuning of their neighbours",
+            "does not speak: of five pressures, it sounds in its register at one at most. Its key is silent",
+            "do not speak: of five pressures, they sound in their register at one at most. Their keys are silent",
             names(|n| n.silent),
         ),
         (
@@ -335,7 +337,7 @@ impl AirArg {
 #[derive(Args)]
 #[group(id = "notes", multiple = false)]
 pub struct NotesArg {
-    /// Every note of the fingering chart (the default)
+    /// Every note of the fingering chart: the default, except for a curve, which is of one note
     #[arg(long)]
     all: bool,
     /// One written note: a MIDI number (65) or a name (F4)

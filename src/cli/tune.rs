@@ -47,7 +47,7 @@ Examples:
 /// Each note is tongued, held (without breath noise unless --noise is given) and measured when steady. Cents are against equal temperament at --a4.
 /// register_ok is 1 when the note asked for sounds, within 150 cents, 0 when another does (a clarion note that falls down a twelfth, a
 /// squeak) or none; a note that does not sound has nan. A small delay for each note corrects what bore and reed leave out of
-/// tune; as_built_cents is where the bore plays the note without it, as it does for all with --untuned. Whoever moves a hole looks there.
+/// tune; as_built_cents is where the bore plays the note without it, as it does for all with --untuned. If you move a hole, read this column.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct TuneCommand {
@@ -130,6 +130,11 @@ impl TuneCommand {
             }
         }
         table.finish()?;
+        let silent = notes.iter().zip(&heard).filter(|(_, heard)| heard.is_none());
+        let silent: Vec<_> = silent.map(|(note, _)| note.to_string()).collect();
+        if !silent.is_empty() {
+            say!("note: with {blown} there is no tone on {}", silent.join(" "));
+        }
         plot.draw(|| {
             let mut rounds = Vec::new();
             if let Some(model) = &tuned {

@@ -161,6 +161,32 @@ fn a_zero_is_refused_while_the_signs_are_probed_and_none_comes_later() {
 }
 
 #[test]
+fn positions_that_piled_up_before_the_session_are_no_restart_and_no_rate() {
+    let mut course = Course::new(false);
+    // Nobody listens for half a minute; the line keeps what came first, as that of a pseudo-terminal does.
+    let mut pile = Vec::new();
+    for _ in 0..30_000 {
+        course.ms += 1;
+        for half in 0..2 {
+            course.firmware.tick((course.now_us() + 500 * half) as u64, &Reading::default());
+        }
+        let mut bytes = [0; 1024];
+        let length = course.firmware.transmit(&mut bytes);
+        if pile.len() < 16_384 {
+            pile.extend_from_slice(&bytes[..length]);
+        }
+    }
+    let now_us = course.now_us();
+    course.session = HostSession::new(Binding::Serial, 6, now_us);
+    course.session.receive(now_us, &pile, &mut |_| {});
+    course.run(1_600);
+    assert_eq!(course.session.notice(), None);
+    let stats = course.session.stats();
+    assert!((450.0..550.0).contains(&stats.rate_hz), "{stats:?}");
+    assert!(stats.states < 900, "{stats:?}");
+}
+
+#[test]
 fn a_zero_that_waits_ends_with_every_disarming() {
     let mut course = Course::new(false);
     course.aim = 900;

@@ -169,8 +169,8 @@ impl<'a> BreathAndHaptics<'a> {
         let told = [
             said(found.begins, "begins at"),
             said(found.beats, "is shut for a part of each period from"),
-            said(found.chokes, "chokes at"),
-            said(found.returns, "comes back, fading, at"),
+            said(found.chokes, "chokes, while the breath rises, at"),
+            said(found.returns, "sounds again, when the breath falls, from"),
             said(found.ends, "ends at"),
         ];
         let told: Vec<String> = told.into_iter().flatten().collect();

@@ -20,8 +20,8 @@ pub(super) struct BreathArgs {
     /// one to the other over the whole length
     #[arg(long, value_name = "D|FROM:TO", value_parser = dynamics)]
     pub dynamic: Option<(f64, f64)>,
-    /// Constant mouth pressure over closing pressure, 0..3, with every preset [default: 0.5 unless a MIDI file plays]. Only with
-    /// --breath-response played it is a share of full breath
+    /// Constant mouth pressure over closing pressure, 0..3 [default: 0.5 unless a MIDI file plays]. With --breath-response played:
+    /// a share of full breath, 0..1
     #[arg(long, value_name = "G", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
     pub gamma: Option<f64>,
     /// Mouth pressure over closing pressure over time: a CSV file t_s,gamma, or ramp:FROM:TO:SECONDS, then held, or one number.

@@ -115,11 +115,12 @@ impl FeelRefused {
                 "{note} would be felt to start at {a_on_deg:.0} degrees, too near closure at {a_close_deg:.0}"
             ),
             Self::Ceiling { note, wanted_mnm, ceiling_mnm, .. } => {
-                format!("{note} would need {wanted_mnm:.0} mNm, the ceiling is {ceiling_mnm:.0}")
+                format!("{note} would need {:.0} mNm, the ceiling is {ceiling_mnm:.0}", wanted_mnm.ceil())
             }
             Self::Stiffness { note, wanted, limit } => {
                 format!(
-                    "{note} would be as steep as {wanted:.3} N m/rad, the knob stays still up to {limit:.3}"
+                    "{note} would be as steep as {:.3} N m/rad; above {limit:.3} a knob oscillates",
+                    (1e3 * wanted).ceil() / 1e3
                 )
             }
             Self::Push { note, wanted, limit } => {

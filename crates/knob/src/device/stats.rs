@@ -63,6 +63,13 @@ impl Meter {
         }
     }
 
+    /// Counts positions anew from `now_us`.
+    pub fn begin(&mut self, now_us: i64) {
+        self.late_us.clear();
+        self.next_late = 0;
+        (self.states, self.states_at_second, self.second_us) = (0, 0, now_us);
+    }
+
     /// Counts an arrival that came `late_us` after its steady time.
     pub fn state(&mut self, late_us: i64) {
         self.states += 1;

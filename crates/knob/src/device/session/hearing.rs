@@ -6,6 +6,7 @@ use super::{
     HostSession, Incoming, LONGEST_PERIOD_US, Notice, PLAIN_GAP_US, PLAIN_PERIOD_US, SessionEvent,
     StateSample, ZERO_IS_LOST,
 };
+use crate::device::clock::DeviceClock;
 use crate::device::session::slaps::Slaps;
 use crate::device::transport::Binding;
 use crate::wire;
@@ -97,7 +98,10 @@ impl HostSession {
             self.rate_due = self.binding == Binding::Serial;
             self.is_dated = false;
             self.feeling.forget();
-            // What had piled up on the line before anybody read it is no loss of this session.
+            // What had piled up on the line before anybody read it is no loss of this session, tells no rate, and is too old to
+            // compare clocks by: the positions after it would look like those of a knob that has restarted.
+            self.clock = DeviceClock::default();
+            self.meter.begin(now_us);
             match &mut self.ears {
                 Incoming::Midi(receiver) => receiver.forget_counts(),
                 Incoming::Stream(decoder) => decoder.forget_counts(),
