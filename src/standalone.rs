@@ -25,7 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Parser;
 use nice_plug::prelude::nice_export_standalone_with_args;
 
-use crate::editor::connections::Connections;
+use crate::editor::connections::{Connections, DeviceChoice};
 use crate::plugin::launch_options::LaunchOptions;
 use arguments::{Args, Attempt, Backend};
 use jack::{JackClient, JackLink};
@@ -61,23 +61,36 @@ pub fn main() -> ExitCode {
     if args.new_session {
         session::set_aside();
     }
-    // Without this, the program would go on without sound after a panic on a backend's thread.
-    std::panic::set_hook(Box::new(|why| {
-        eprintln!("chalumeau-standalone: {why}");
-        std::process::exit(1);
-    }));
     let kept = devices::kept();
-    let mut attempts = args.attempts(&kept);
+    let failed = quit::devices_that_failed();
+    let usable = if failed.is_some() { DeviceChoice::default() } else { kept.clone() };
+    let mut attempts = args.attempts(&usable);
     if has_window && !args.names_a_place() {
         attempts.push(Attempt::silent());
     }
+    // Without this, the program would go on without sound after a panic on a backend's thread.
+    let may_try_others = has_window && !args.names_a_place() && usable != DeviceChoice::default();
+    std::panic::set_hook(Box::new(move |why| {
+        eprintln!("chalumeau-standalone: {why}");
+        if may_try_others && !devices::has_begun() {
+            quit::start_without_devices(why.payload_as_str().unwrap_or("for a reason that it does not give"));
+        }
+        std::process::exit(1);
+    }));
     let mut tried: Vec<(Attempt, String)> = Vec::new();
     for attempt in attempts {
         last_error.clear();
+        let problem = problem(&attempt, &tried).or_else(|| {
+            let why = failed.as_ref()?;
+            Some(format!("The chosen devices do not play ({why}). Choose others in the Instrument view."))
+        });
+        if let Some(problem) = problem.as_ref().filter(|_| !has_window) {
+            eprintln!("chalumeau-standalone: {problem}");
+        }
         LaunchOptions::connect(|now| {
             *now = Connections {
-                chosen: kept.clone(),
-                problem: problem(&attempt, &tried),
+                chosen: args.in_window(&attempt, &kept),
+                problem,
                 devices: now.devices.clone(),
                 ..args.connections(&attempt)
             };
@@ -119,20 +132,30 @@ pub fn main() -> ExitCode {
 
 /// What the window says if this is not what the user has chosen.
 fn problem(attempt: &Attempt, tried: &[(Attempt, String)]) -> Option<String> {
-    let (first, reason) = tried.first().filter(|_| attempt.is_instead)?;
+    let (wanted, _) = tried.iter().rev().find(|(one, _)| attempt.is_instead && !one.is_instead)?;
+    let is_there = |one: &Attempt| (one.backend, &one.output) == (wanted.backend, &wanted.output);
+    // The last attempt there says best why: it asks for the least.
+    let (_, reason) = tried.iter().rev().find(|(one, _)| is_there(one))?;
     // The framework lists devices after its reason.
     let reason = reason.split(". Available devices are:").next().unwrap_or(reason);
-    let now = match attempt.backend {
-        Backend::Dummy => "No sound",
-        Backend::Jack => "Sound goes to JACK",
-        _ => "Sound goes to the system's output",
-    };
-    let name = match (&first.output, first.backend) {
+    let name = match (&wanted.output, wanted.backend) {
         (Some(name), _) => name.as_str(),
         (None, Backend::Jack) => "JACK",
         (None, _) => "the system's output",
     };
-    Some(format!("{now}: {name} does not open ({reason}). Choose an output in the Instrument view."))
+    let now = match attempt.backend {
+        Backend::Dummy => format!("No sound: {name} does not open"),
+        _ if is_there(attempt) && (attempt.rate_hz, attempt.block) == (wanted.rate_hz, wanted.block) => {
+            "The microphone does not open".to_owned()
+        }
+        _ if is_there(attempt) => {
+            let (rate_hz, block) = (attempt.rate_hz, attempt.block);
+            format!("Sound goes to {name} at {rate_hz} Hz in blocks of {block}: the chosen ones are refused")
+        }
+        Backend::Jack => format!("Sound goes to JACK: {name} does not open"),
+        _ => format!("Sound goes to the system's output: {name} does not open"),
+    };
+    Some(format!("{now} ({reason}). Choose devices in the Instrument view."))
 }
 
 /// Whether windows need X11 here and it is missing.
@@ -187,19 +210,43 @@ mod tests {
 
     #[test]
     fn the_window_says_what_does_not_open_and_where_sound_goes_instead() {
-        let card =
-            Attempt { output: Some("Card".to_owned()), is_instead: false, ..attempt(arguments::SYSTEM) };
-        assert_eq!(problem(&card, &[]), None);
-        let reason = "Unknown output device 'Card'. Available devices are:\nOther".to_owned();
-        let said = problem(&attempt(arguments::SYSTEM), &[(card.clone(), reason)]).unwrap();
+        let system = || attempt(arguments::SYSTEM);
+        let wanted = Attempt {
+            output: Some("Card".to_owned()),
+            microphone: Some(("Mic".to_owned(), 1)),
+            rate_hz: 96_000.0,
+            is_instead: false,
+            ..system()
+        };
+        assert_eq!(problem(&wanted, &[]), None);
+        let no_mic = (wanted.clone(), "Unknown input device 'Mic'. Available devices are:\nOther".to_owned());
+        let here = Attempt { microphone: None, is_instead: true, ..wanted.clone() };
+        let ends = "Choose devices in the Instrument view.";
         assert_eq!(
-            said,
-            "Sound goes to the system's output: Card does not open (Unknown output device 'Card'). Choose an output in the \
-             Instrument view."
+            problem(&here, std::slice::from_ref(&no_mic)).unwrap(),
+            format!("The microphone does not open (Unknown input device 'Mic'). {ends}")
         );
-        // Automatic has tried one of its own.
-        let jack = Attempt { is_instead: false, ..attempt(Backend::Jack) };
-        assert_eq!(problem(&Attempt { output: None, ..card }, &[(jack, "no server".to_owned())]), None);
+        let no_rate = (here.clone(), "no such rate".to_owned());
+        let slower = Attempt { rate_hz: 48_000.0, ..here };
+        assert_eq!(
+            problem(&slower, &[no_mic.clone(), no_rate.clone()]).unwrap(),
+            format!(
+                "Sound goes to Card at 48000 Hz in blocks of 256: the chosen ones are refused (no such rate). {ends}"
+            )
+        );
+        let no_card = (slower, "busy".to_owned());
+        assert_eq!(
+            problem(&system(), &[no_mic, no_rate, no_card]).unwrap(),
+            format!("Sound goes to the system's output: Card does not open (busy). {ends}")
+        );
+        // Automatic has tried JACK before the sound card.
+        let usual = |backend| Attempt { is_instead: false, ..attempt(backend) };
+        let jack = (usual(Backend::Jack), "no server".to_owned());
+        assert_eq!(problem(&usual(arguments::SYSTEM), std::slice::from_ref(&jack)), None);
+        assert_eq!(
+            problem(&Attempt::silent(), &[jack, (usual(arguments::SYSTEM), "no card".to_owned())]).unwrap(),
+            format!("No sound: the system's output does not open (no card). {ends}")
+        );
     }
 
     #[test]

@@ -116,7 +116,7 @@ impl<W: Write + Seek> WavFile<W> {
     /// Takes in the square of a sample.
     fn look_after_beginning(&mut self, square: f64) {
         let in_one_s = f64::from(self.rate) * f64::from(self.channels);
-        if (self.power.1 as f64) < BEGINNING_S * in_one_s {
+        if (self.power.1 as f64) <= BEGINNING_S * in_one_s {
             return;
         }
         self.window = (self.window.0 + square, self.window.1 + 1);

@@ -996,7 +996,7 @@ fn a_scale_has_the_notes_of_the_chart() {
         message
     };
     let message = scale("F3:D3");
-    assert!(message.contains("no D#3;") && message.contains("0.300 s"), "{message}");
+    assert!(message.contains("does not have: D#3") && message.contains("0.300 s"), "{message}");
     assert!(!scale("E3:F3").contains("leaves"));
     refused(&d, "render --instrument new.toml --scale D3:F#3 --out y.wav", &["F#3", "no fingering"]);
 }

@@ -497,7 +497,7 @@ fn a_report_says_which_feel_a_knob_would_refuse() {
     assert!(!page.contains("Feel sent to the knob"));
     succeeds(&d, "report --written 67 --seconds 0.1 --torque 60 --travel 120 --out s.html");
     let page = String::from_utf8(read(&d, "s.html")).unwrap();
-    assert!(page.contains("N m/rad, the"), "the slope has its words too");
+    assert!(page.contains("N m/rad; above"), "the slope has its words too");
 }
 
 /// Mouth pressure over angle for a few notes; closure lies at the closing pressure.

@@ -94,8 +94,8 @@ struct Job {
 struct Doubtful(BTreeMap<Doubt, Vec<String>>);
 
 impl Doubtful {
-    fn look(&mut self, file: &str, &Rendered { level, resets, .. }: &Rendered) {
-        for doubt in Doubt::all(level, resets) {
+    fn look(&mut self, file: &str, rendered: &Rendered) {
+        for doubt in rendered.doubts() {
             self.0.entry(doubt).or_default().push(file.to_owned());
         }
     }

@@ -25,15 +25,18 @@ pub enum Doubt {
 }
 
 impl Doubt {
-    /// All of a file with these levels, whose calculation broke down so often.
-    pub fn all(level: Levels, resets: u64) -> impl Iterator<Item = Self> {
+    /// All of a file with these levels, whose calculation broke down so often. `is_long`: a note is held beyond [`BEGINNING_S`](crate::wav::BEGINNING_S).
+    pub fn all(level: Levels, resets: u64, is_long: bool) -> impl Iterator<Item = Self> {
         let all = [
             (Self::Clipped, level.clipped > 0),
             (Self::Limited, level.peak >= LIMITED),
             (Self::Reset, resets > 0),
             (
                 Self::NoTone,
-                level.after_beginning.is_some_and(|rms| rms < (NO_TONE[0] * level.peak).min(NO_TONE[1])),
+                is_long
+                    && level
+                        .after_beginning
+                        .is_some_and(|rms| rms <= (NO_TONE[0] * level.peak).min(NO_TONE[1])),
             ),
         ];
         all.into_iter().filter_map(|(doubt, is_so)| is_so.then_some(doubt))
@@ -60,7 +63,7 @@ mod tests {
     fn a_file_with_nothing_but_the_tongues_puff_has_no_tone() {
         let has_tone = |peak: f32, after_beginning: Option<f32>| {
             let level = Levels { peak, after_beginning, ..Levels::default() };
-            !Doubt::all(level, 0).any(|doubt| doubt == Doubt::NoTone)
+            !Doubt::all(level, 0, true).any(|doubt| doubt == Doubt::NoTone)
         };
         // Measured: C4 at gamma 1.8, C4 at 0.34, E5 at gamma 0.4 and zeta 0.2; E3 and C6 at pianissimo.
         for (peak_db, after_db) in [(-26.4, -220.0), (-26.7, -54.9), (-27.5, -57.6)] {
@@ -72,7 +75,9 @@ mod tests {
         }
         assert!(has_tone(0.5, Some(gain(-45.0))), "a loud beginning, then pianissimo");
         assert!(has_tone(0.5, None), "a short file");
-        assert!(has_tone(0.0, Some(0.0)), "a silent file is said to be silent");
+        assert!(!has_tone(0.0, Some(0.0)), "a silent file");
+        let silent = Levels { after_beginning: Some(0.0), ..Levels::default() };
+        assert_eq!(Doubt::all(silent, 0, false).count(), 0, "nothing is held after the beginning");
     }
 
     fn gain(db: f32) -> f32 {

@@ -124,7 +124,7 @@ impl FeltReedArgs {
         let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
         let (bore, reed) = self.bore_and_reed(file)?;
         FeelTable::new(&bore, &design, &reed, &limits)
-            .map_err(|refused| refused_in_flags(refused, "--ceiling"))
+            .map_err(|refused| refused_in_flags(refused, "--ceiling", true))
     }
 }
 

@@ -120,7 +120,7 @@ impl WantedFeel {
                 {
                     design.strength_mnm = strength_mnm;
                 }
-                Err(refused) => return Err(refused_in_flags(refused, "--arm")),
+                Err(refused) => return Err(refused_in_flags(refused, "--arm", false)),
             }
         }
     }
@@ -144,7 +144,7 @@ impl KnobCommand {
         let take = match &self.record {
             Some(path) => {
                 let remarks = [format!(
-                    "{written} (written {}) of {}, felt with {}",
+                    "{written} (written {}) of {}, asked for {}",
                     written.0,
                     file.name,
                     self.feel.in_flags(&wanted.design)

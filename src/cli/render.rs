@@ -12,7 +12,8 @@ use crate::cli::render_monitor::RenderMonitor;
 use crate::cli::score_args::ScoreArgs;
 use crate::cli::shared_args::{whole, within};
 use crate::output::NewFile;
-use crate::wav::{Depth, Levels, WavFile};
+use crate::wav::{BEGINNING_S, Depth, Levels, WavFile};
+use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::instrument::side_by_side::{self, Stand};
 use chalumeau_core::reed::physical::P_REF_PA;
@@ -106,6 +107,15 @@ pub struct Rendered {
     pub resets: u64,
     /// Which given settings have no effect.
     pub idle: Option<String>,
+    /// Whether a note is held beyond [`BEGINNING_S`].
+    pub is_long: bool,
+}
+
+impl Rendered {
+    /// Why it may not be what was asked for.
+    pub fn doubts(&self) -> impl Iterator<Item = Doubt> {
+        Doubt::all(self.level, self.resets, self.is_long)
+    }
 }
 
 impl RenderCommand {
@@ -196,7 +206,8 @@ impl RenderCommand {
         }
         out.keep()?;
         let (seconds, rate) = (score.seconds(*rate), *rate);
-        Ok(Rendered { seconds, rate, channels, level, resets, idle: prepared.idle })
+        let is_long = is_held_beyond(&prepared, BEGINNING_S);
+        Ok(Rendered { seconds, rate, channels, level, resets, idle: prepared.idle, is_long })
     }
 
     /// Whether all that can be known without preparing the instrument is in order. Gives back the settings that have no effect.
@@ -240,7 +251,8 @@ impl RenderCommand {
         [Some(&self.out), self.probe.as_deref(), self.plot.path()]
     }
 
-    fn report(&self, &Rendered { seconds, rate, channels, level, resets, .. }: &Rendered) {
+    fn report(&self, rendered: &Rendered) {
+        let Rendered { seconds, rate, channels, level, .. } = *rendered;
         let bits = match self.bits {
             Bits::Int16 => "16 bit",
             Bits::Int24 => "24 bit",
@@ -253,8 +265,22 @@ impl RenderCommand {
         };
         let out = self.out.display();
         say!("{out}: {seconds:.3} s, {} Hz, {bits}, {channels}, {peak}", rate);
-        Doubt::all(level, resets).for_each(|doubt| say!("warning: {}", doubt.text()));
+        rendered.doubts().for_each(|doubt| say!("warning: {}", doubt.text()));
     }
+}
+
+/// Whether a note is held for a tenth of a second or more after `seconds`.
+fn is_held_beyond(job: &RenderJob, seconds: f64) -> bool {
+    let least = ((seconds + 0.1) * f64::from(job.rate)) as usize;
+    let mut held = std::collections::BTreeSet::new();
+    job.score.events.iter().any(|timed| match timed.event {
+        Event::NoteOn { note, .. } => {
+            held.insert(note);
+            false
+        }
+        Event::NoteOff { note } => held.remove(&note) && timed.at >= least,
+        _ => false,
+    }) || (!held.is_empty() && job.score.samples >= least)
 }
 
 /// How it was played, for the lines under a figure's title.

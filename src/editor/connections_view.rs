@@ -51,9 +51,12 @@ pub fn draw(ui: &mut Ui, connections: &Connections, actions: &mut Vec<Action>) {
                 ui.set_max_width(half);
                 list(ui, "Sample rate", &mut choice.rate_hz, RATES_HZ, |rate_hz| format!("{rate_hz} Hz"), tip);
             });
-            let tip = "Samples in a block. Small blocks respond faster, but the sound may drop out. JACK sets its own.";
-            let text = |block: &u32| format!("blocks of {block}");
-            list(ui, "Samples per block", &mut choice.block, BLOCKS, text, tip);
+            // WASAPI has a block length of its own.
+            if !cfg!(windows) {
+                let tip = "Samples in a block. Small blocks respond faster, but the sound may drop out. JACK sets its own.";
+                let text = |block: &u32| format!("blocks of {block}");
+                list(ui, "Samples per block", &mut choice.block, BLOCKS, text, tip);
+            }
         });
     }
     named(ui, "MIDI inputs", &connections.midi_line());
@@ -81,7 +84,7 @@ pub fn draw(ui: &mut Ui, connections: &Connections, actions: &mut Vec<Action>) {
     } else {
         ui.horizontal(|ui| {
             let about =
-                "The program starts again, with your settings and these devices. Later starts use them, too.";
+                "The program starts again, with your settings and these devices, and without the arguments of its command line. Later starts use these devices, too.";
             let button =
                 egui::Button::new(RichText::new("Restart with these").color(c.on_accent)).fill(c.accent);
             if ui.add(button).on_hover_text(about).clicked() {

@@ -44,15 +44,15 @@ pub struct Args {
     /// Where sound and MIDI go.
     #[arg(short, long, default_value = "auto")]
     pub backend: Backend,
-    /// Sample rate, 1000..1536000 Hz; JACK sets its own. Without it, that chosen in the window, at first 48000.
+    /// Sample rate, 1000..1536000 Hz; JACK sets its own [default: 48000, or as chosen in the window].
     #[arg(short = 'r', long, value_name = "HZ", value_parser = rate)]
     sample_rate: Option<f32>,
-    /// Samples per block, 16..8192; JACK sets its own. Small blocks respond faster, but the sound may drop out. Without it, that
-    /// chosen in the window, at first 256.
+    /// Samples per block, 16..8192; JACK sets its own. Small blocks respond faster, but the sound may drop out
+    /// [default: 256, or as chosen in the window].
     #[arg(short, long, value_name = "SAMPLES",
           value_parser = clap::value_parser!(u32).range(i64::from(*BLOCKS.start())..=i64::from(*BLOCKS.end())))]
     period_size: Option<u32>,
-    /// Name of the sound card; an empty name lists them. Without it, that chosen in the window. Not for JACK.
+    /// Name of the sound card; an empty name lists them. Without it, the output chosen in the window. Not for JACK.
     #[arg(short, long, value_name = "NAME")]
     output_device: Option<String>,
     /// Name of the sound card's input with a microphone that you blow at; an empty name lists them. Not for JACK.
@@ -235,7 +235,12 @@ impl Args {
         let (low, high) = HOST_RATES_HZ;
         let kept_hz = f64::from(chosen.rate_hz).clamp(low, high) as f32;
         let rate_hz = self.sample_rate.unwrap_or(kept_hz);
-        let block = self.period_size.unwrap_or(chosen.block.clamp(*BLOCKS.start(), *BLOCKS.end()));
+        let block_at = |rate_hz: f32, chosen: u32| {
+            // The period of WASAPI, which takes no other.
+            let block = if cfg!(windows) { (rate_hz / 100.0) as u32 } else { chosen };
+            self.period_size.unwrap_or(block.clamp(*BLOCKS.start(), *BLOCKS.end()))
+        };
+        let block = block_at(rate_hz, chosen.block);
         let midi_input = self.midi_input.clone().or_else(|| chosen.midi_input.clone());
         let plain = Attempt {
             backend: SYSTEM,
@@ -260,15 +265,46 @@ impl Args {
         }
         if !names_a_place {
             let usual = DeviceChoice::default();
-            let (rate_hz, block) = (usual.rate_hz as f32, usual.block);
+            let rate_hz = usual.rate_hz as f32;
+            let at_usual_rate = |attempt: &Attempt| Attempt {
+                rate_hz,
+                block: block_at(rate_hz, usual.block),
+                ..attempt.clone()
+            };
+            // First without the microphone, then at another rate, then elsewhere.
+            let here = Attempt { output, ..plain.clone() };
             let jack = Attempt { backend: Backend::Jack, ..plain.clone() };
-            for instead in [plain.clone(), Attempt { rate_hz, block, ..plain }, jack] {
+            for instead in [here.clone(), at_usual_rate(&here), plain.clone(), at_usual_rate(&plain), jack] {
                 if !attempts.contains(&instead) {
                     attempts.push(Attempt { is_instead: true, ..instead });
                 }
             }
         }
         attempts
+    }
+
+    /// The choice that the lists of the window begin with: what is in use, or, if that is not what the user has chosen, the choice.
+    pub fn in_window(&self, attempt: &Attempt, kept: &DeviceChoice) -> DeviceChoice {
+        let output = match (&attempt.output, attempt.backend) {
+            _ if !self.names_a_place() => kept.output.clone(),
+            (Some(name), _) => OutputChoice::Device(name.clone()),
+            (None, Backend::Jack) => OutputChoice::Jack,
+            (None, SYSTEM) => OutputChoice::System,
+            (None, _) => kept.output.clone(),
+        };
+        if attempt.is_instead {
+            return kept.clone();
+        }
+        DeviceChoice {
+            output,
+            rate_hz: attempt.rate_hz as u32,
+            block: attempt.block,
+            microphone: match &attempt.microphone {
+                Some((name, _)) => Some(name.clone()),
+                None => kept.microphone.clone().filter(|_| !self.names_a_place()),
+            },
+            midi_input: attempt.midi_input.clone(),
+        }
     }
 
     /// The arguments for the framework. With JACK it runs the dummy backend at the server's rate.
@@ -421,17 +457,30 @@ mod tests {
             assert_eq!(attempt.microphone, Some(("Mic".to_owned(), channels)));
             assert_eq!(args(&[]).keyboards(attempt), Some(Some("Wind".to_owned())));
         }
-        // Without the card the system's output plays, at the rate it has been given, else at the usual one; and then JACK.
+        // Without the microphone, at another rate, to the system's output, and then JACK.
         let instead: Vec<_> = all.iter().filter(|attempt| attempt.is_instead).collect();
+        let places: Vec<_> =
+            instead.iter().map(|one| (one.backend, one.output.as_deref(), one.rate_hz)).collect();
+        let (card, here, there) = (Some("Card"), 96_000.0, 48_000.0);
         assert_eq!(
-            instead.iter().map(|one| one.backend).collect::<Vec<_>>(),
-            [SYSTEM, SYSTEM, Backend::Jack]
+            places,
+            [
+                (SYSTEM, card, here),
+                (SYSTEM, card, there),
+                (SYSTEM, None, here),
+                (SYSTEM, None, there),
+                (Backend::Jack, None, here)
+            ]
         );
-        assert_eq!(instead.iter().map(|one| one.rate_hz).collect::<Vec<_>>(), [96_000.0, 48_000.0, 96_000.0]);
-        assert!(instead.iter().all(|one| one.output.is_none() && one.microphone.is_none()));
+        assert!(instead.iter().all(|one| one.microphone.is_none()));
         // What the arguments say goes first.
         let other = args(&["-o", "Other", "-r", "44100"]).attempts(&kept);
         assert_eq!(other.len(), 1, "{other:?}");
+        let shown = args(&["-o", "Other", "-r", "44100"]).in_window(&other[0], &kept);
+        assert_eq!((shown.output, shown.rate_hz), (OutputChoice::Device("Other".to_owned()), 44_100));
+        assert_eq!(shown.microphone, None);
+        assert_eq!(args(&[]).in_window(&all[0], &kept), kept);
+        assert_eq!(args(&[]).in_window(&all[3], &kept), kept);
         assert_eq!(
             (other[0].output.as_deref(), other[0].rate_hz, other[0].block),
             (Some("Other"), 44_100.0, 256)

@@ -2,7 +2,7 @@
 //! asks for sound.
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
@@ -54,18 +54,21 @@ fn keep(choice: &DeviceChoice) -> Result<(), String> {
     output::replace(&path, &bytes).map_err(|reason| reason.to_string())
 }
 
+/// Whether the output has asked for sound.
+pub fn has_begun() -> bool {
+    BLOCKS.load(Ordering::Relaxed) > 0
+}
+
 /// Does what the window asks for, until the program ends.
 pub fn serve(options: &'static LaunchOptions) {
     let (tasks, asked) = channel();
     *options.device_tasks.lock().unwrap_or_else(PoisonError::into_inner) = Some(tasks);
     let serve = move || {
         let mut watch = Watch::new(Instant::now());
+        let mut before = None;
         loop {
             match asked.recv_timeout(LOOK) {
-                Ok(DeviceTask::Look) => {
-                    let devices = Arc::new(lists());
-                    LaunchOptions::connect(|now| now.devices = devices);
-                }
+                Ok(DeviceTask::Look) => look(),
                 Ok(DeviceTask::Use(choice)) => match keep(&choice) {
                     Ok(()) => {
                         options.restart.store(true, Ordering::Relaxed);
@@ -80,15 +83,35 @@ pub fn serve(options: &'static LaunchOptions) {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
-            if watch.has_just_stopped(BLOCKS.load(Ordering::Relaxed), Instant::now()) {
-                let problem = "The sound output has stopped. Choose one in the Instrument view.";
-                eprintln!("chalumeau-standalone: {problem}");
-                LaunchOptions::connect(|now| now.problem = Some(problem.to_owned()));
+            match watch.look(BLOCKS.load(Ordering::Relaxed), Instant::now()) {
+                Some(Change::Stopped) => {
+                    let problem = "The sound output has stopped. Choose devices in the Instrument view.";
+                    eprintln!("chalumeau-standalone: {problem}");
+                    LaunchOptions::connect(|now| before = now.problem.replace(problem.to_owned()));
+                }
+                Some(Change::Resumed) => LaunchOptions::connect(|now| now.problem = before.take()),
+                None => {}
             }
         }
     };
     // Without the thread, the lists stay empty.
     let _ = std::thread::Builder::new().name("devices".to_owned()).spawn(serve);
+}
+
+/// Looks on a thread of its own, one at a time: a sound system that has died may never answer.
+fn look() {
+    static IS_LOOKING: AtomicBool = AtomicBool::new(false);
+    if IS_LOOKING.swap(true, Ordering::Relaxed) {
+        return;
+    }
+    let look = || {
+        let devices = Arc::new(lists());
+        LaunchOptions::connect(|now| now.devices = devices);
+        IS_LOOKING.store(false, Ordering::Relaxed);
+    };
+    if std::thread::Builder::new().name("device lists".to_owned()).spawn(look).is_err() {
+        IS_LOOKING.store(false, Ordering::Relaxed);
+    }
 }
 
 /// Notices that nobody asks for blocks any more.
@@ -99,18 +122,29 @@ struct Watch {
     has_stopped: bool,
 }
 
+/// What an output does that it did not do at the last look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Change {
+    /// It asks for sound no more.
+    Stopped,
+    /// It asks for sound again.
+    Resumed,
+}
+
 impl Watch {
     fn new(now: Instant) -> Self {
         Self { blocks: 0, at: now, has_stopped: false }
     }
 
-    /// Whether the output has stopped since the last look. One that has not begun yet has not stopped.
-    fn has_just_stopped(&mut self, blocks: u32, now: Instant) -> bool {
+    /// What has changed since the last look. An output that has not begun yet has not stopped.
+    fn look(&mut self, blocks: u32, now: Instant) -> Option<Change> {
         if blocks != self.blocks || blocks == 0 {
+            let resumed = self.has_stopped.then_some(Change::Resumed);
             *self = Self { blocks, at: now, has_stopped: false };
-            return false;
+            return resumed;
         }
-        now.duration_since(self.at) > STOPPED && !std::mem::replace(&mut self.has_stopped, true)
+        let stops = now.duration_since(self.at) > STOPPED && !std::mem::replace(&mut self.has_stopped, true);
+        stops.then_some(Change::Stopped)
     }
 }
 
@@ -130,9 +164,18 @@ fn lists() -> DeviceLists {
 fn midi_inputs() -> Vec<String> {
     let Ok(list) = MidiInput::new(keyboards::CLIENT) else { return Vec::new() };
     let names = list.ports().into_iter().filter_map(|port| list.port_name(&port).ok());
-    names
-        .filter(|name| keyboards::plays_unasked([name.as_str()]) && !name.contains(keyboards::CLIENT))
-        .collect()
+    let names =
+        names.filter(|name| keyboards::plays_unasked([name.as_str()]) && !name.contains(keyboards::CLIENT));
+    names.map(|name| without_numbers(&name).to_owned()).collect()
+}
+
+/// ALSA's name of a port ends with numbers that change when it is plugged in again: `KeyStep:KeyStep MIDI 1 24:0`.
+fn without_numbers(name: &str) -> &str {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let last = name.rsplit_once(' ').filter(|(_, last)| {
+        last.split_once(':').is_some_and(|(client, port)| is_number(client) && is_number(port))
+    });
+    last.map_or(name, |(name, _)| name)
 }
 
 /// The framework opens the first device of a name.
@@ -151,13 +194,21 @@ mod tests {
         let began = Instant::now();
         let after = |s: u64| began + Duration::from_secs(s);
         let mut watch = Watch::new(began);
-        assert!(!watch.has_just_stopped(0, after(60)), "it has not begun");
-        assert!(!watch.has_just_stopped(1, after(61)));
-        assert!(!watch.has_just_stopped(1, after(63)), "a busy machine");
-        assert!(watch.has_just_stopped(1, after(65)));
-        assert!(!watch.has_just_stopped(1, after(70)), "said already");
-        assert!(!watch.has_just_stopped(2, after(71)), "it goes on");
-        assert!(watch.has_just_stopped(2, after(75)));
+        assert_eq!(watch.look(0, after(60)), None, "it has not begun");
+        assert_eq!(watch.look(1, after(61)), None);
+        assert_eq!(watch.look(1, after(63)), None, "a busy machine");
+        assert_eq!(watch.look(1, after(65)), Some(Change::Stopped));
+        assert_eq!(watch.look(1, after(70)), None, "said already");
+        assert_eq!(watch.look(2, after(71)), Some(Change::Resumed));
+        assert_eq!(watch.look(3, after(72)), None);
+        assert_eq!(watch.look(3, after(76)), Some(Change::Stopped));
+    }
+
+    #[test]
+    fn a_keyboard_is_kept_without_the_numbers_that_change() {
+        assert_eq!(without_numbers("KeyStep:KeyStep MIDI 1 24:0"), "KeyStep:KeyStep MIDI 1");
+        assert_eq!(without_numbers("KeyStep 37"), "KeyStep 37");
+        assert_eq!(without_numbers("24:0"), "24:0");
     }
 
     #[test]

@@ -11,6 +11,9 @@ use crate::plugin::launch_options::LaunchOptions;
 /// for it.
 const PATIENCE: Duration = Duration::from_millis(1_500);
 
+/// Environment variable that tells the next start why the chosen devices have stopped this one.
+const FAILED: &str = "CHALUMEAU_DEVICES_FAILED";
+
 /// Makes Ctrl-C, and on Unix SIGTERM and SIGHUP, end the program.
 ///
 /// The framework wants to catch the same signals. It comes second, and leaves them to this function.
@@ -34,29 +37,44 @@ pub fn begin(options: &'static LaunchOptions) {
     let _ = std::thread::Builder::new().name("QuitWatch".to_owned()).spawn(move || {
         std::thread::sleep(PATIENCE);
         eprintln!("chalumeau-standalone: the sound system does not let go; ended without it");
-        if options.restart.load(Ordering::Relaxed) {
-            start_again();
-        }
+        end(options);
         std::process::exit(0);
     });
+    // The sound system may never let the program come to the end at which it is saved, too.
+    StandalonePlugin::save();
     if !options.has_window || options.window_failed.load(Ordering::Relaxed) {
         StandalonePlugin::end();
         std::process::exit(0);
     }
 }
 
-/// Starts the program again if the user wants it. It needs no arguments: the session and the choice of devices are kept.
+/// Starts the program again if the user wants it, and nobody else has done it. It gets no arguments: the session and the choice of
+/// devices are kept.
 pub fn end(options: &LaunchOptions) -> ExitCode {
-    if options.restart.load(Ordering::Relaxed) { start_again() } else { ExitCode::SUCCESS }
+    if options.restart.swap(false, Ordering::Relaxed) { start_again(None) } else { ExitCode::SUCCESS }
+}
+
+/// Starts the program again with the usual devices: the chosen ones have stopped it, for the reason `why`.
+pub fn start_without_devices(why: &str) {
+    start_again(Some(why));
+}
+
+/// Why the chosen devices have stopped the program before this start, if they have.
+pub fn devices_that_failed() -> Option<String> {
+    std::env::var(FAILED).ok()
 }
 
 /// Returns only if it has started another process, or cannot start one.
-fn start_again() -> ExitCode {
+fn start_again(devices_failed: Option<&str>) -> ExitCode {
     let path = match std::env::current_exe() {
         Ok(path) => path,
         Err(reason) => return cannot(&reason),
     };
     let mut program = Command::new(path);
+    match devices_failed {
+        Some(why) => program.env(FAILED, why.lines().next().unwrap_or_default()),
+        None => program.env_remove(FAILED),
+    };
     // The same process keeps its terminal.
     #[cfg(unix)]
     return cannot(&std::os::unix::process::CommandExt::exec(&mut program));

@@ -136,6 +136,13 @@ impl StandalonePlugin {
         }
     }
 
+    /// Writes the session of the plugin that plays.
+    pub fn save() {
+        if let Some(Self { session: Some(session), .. }) = &*locked(&PLAYING) {
+            session.save();
+        }
+    }
+
     fn silence(&self) {
         // Closes the client. The lock is free again before that.
         let jack = locked(&self.jack).take();

@@ -150,8 +150,10 @@ impl SnapshotThread {
         snapshot.status = self.status(current.as_ref(), &inside);
         snapshot.connections = LaunchOptions::connections();
         if let Some(problem) = snapshot.connections.as_ref().and_then(|now| now.problem.clone()) {
-            // Before all others: nobody hears anything.
-            snapshot.status.insert(0, Status { level: Severity::Warn, text: problem });
+            // After what concerns the knob's safety.
+            let place = snapshot.status.iter().position(|one| one.level != Severity::Warn);
+            let place = place.unwrap_or(snapshot.status.len());
+            snapshot.status.insert(place, Status { level: Severity::Warn, text: problem });
         }
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();

@@ -17,7 +17,7 @@ pub struct LinkStats {
     pub jitter_p50_us: u32,
     /// 99th percentile of the same, us.
     pub jitter_p99_us: u32,
-    /// STATE received since the port was opened.
+    /// STATE received since the knob first answered, or since it has restarted; since the port was opened, if it never answers.
     pub states: u64,
     /// Frames, gaps, duplicates and damaged frames since the port was opened.
     pub wire: WireStats,
@@ -67,7 +67,7 @@ impl Meter {
     pub fn begin(&mut self, now_us: i64) {
         self.late_us.clear();
         self.next_late = 0;
-        (self.states, self.states_at_second, self.second_us) = (0, 0, now_us);
+        (self.states, self.states_at_second, self.second_us, self.rate_hz) = (0, 0, now_us, 0.0);
     }
 
     /// Counts an arrival that came `late_us` after its steady time.

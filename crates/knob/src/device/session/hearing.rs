@@ -100,7 +100,9 @@ impl HostSession {
             self.feeling.forget();
             // What had piled up on the line before anybody read it is no loss of this session, tells no rate, and is too old to
             // compare clocks by: the positions after it would look like those of a knob that has restarted.
+            // Until the next position, the knob has said nothing, and cannot be armed.
             self.clock = DeviceClock::default();
+            self.state = None;
             self.meter.begin(now_us);
             match &mut self.ears {
                 Incoming::Midi(receiver) => receiver.forget_counts(),
