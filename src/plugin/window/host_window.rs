@@ -77,7 +77,9 @@ impl Editor for HostWindow {
         if let (true, Ok(spawned)) = (has_parent, &spawned) {
             let _ = spawned.handle.show(&spawned.window);
         }
-        if let (Err(_), Some(options)) = (&spawned, LaunchOptions::get()) {
+        if let (Err(reason), Some(options)) = (&spawned, LaunchOptions::get()) {
+            // The framework tells the reason when the program ends, if at all.
+            eprintln!("chalumeau-standalone: the window does not open: {reason}");
             options.window_failed.store(true, Ordering::Relaxed);
         }
         spawned
