@@ -80,13 +80,12 @@ pub fn main() -> ExitCode {
     let mut tried: Vec<(Attempt, String)> = Vec::new();
     for attempt in attempts {
         last_error.clear();
-        let problem = problem(&attempt, &tried).or_else(|| {
-            let why = failed.as_ref()?;
-            Some(format!("The chosen devices do not play ({why}). Choose others in the Instrument view."))
-        });
+        let failed = failed.as_ref().map(|why| format!("The chosen devices do not play ({why})"));
+        let problem = problem(&attempt, &tried).or(failed);
         if let Some(problem) = problem.as_ref().filter(|_| !has_window) {
-            eprintln!("chalumeau-standalone: {problem}");
+            eprintln!("chalumeau-standalone: {problem}; other devices: --output-device, --input-device");
         }
+        let problem = problem.map(|problem| format!("{problem}. Choose devices in the Instrument view."));
         LaunchOptions::connect(|now| {
             *now = Connections {
                 chosen: args.in_window(&attempt, &kept),
@@ -97,7 +96,7 @@ pub fn main() -> ExitCode {
         });
         options.microphone.store(args.hears_microphone(&attempt), Ordering::Relaxed);
         // Held while the framework plays.
-        let _keyboards = args.keyboards(&attempt).map(Keyboards::open);
+        let keyboards = args.keyboards(&attempt).map(Keyboards::open);
         let words = match (attempt.backend == Backend::Jack).then(JackClient::open) {
             None => args.for_framework(&attempt),
             Some(Ok(client)) => {
@@ -112,6 +111,8 @@ pub fn main() -> ExitCode {
             }
         };
         if nice_export_standalone_with_args::<StandalonePlugin, _>(words) {
+            // Windows lets only one program at a time open a MIDI input, and the next start wants it.
+            drop(keyboards);
             return quit::end(options);
         }
         if options.window_failed.load(Ordering::Relaxed) {
@@ -130,7 +131,7 @@ pub fn main() -> ExitCode {
     ExitCode::FAILURE
 }
 
-/// What the window says if this is not what the user has chosen.
+/// What the user is told if this is not what the user has chosen.
 fn problem(attempt: &Attempt, tried: &[(Attempt, String)]) -> Option<String> {
     let (wanted, _) = tried.iter().rev().find(|(one, _)| attempt.is_instead && !one.is_instead)?;
     let is_there = |one: &Attempt| (one.backend, &one.output) == (wanted.backend, &wanted.output);
@@ -155,7 +156,7 @@ fn problem(attempt: &Attempt, tried: &[(Attempt, String)]) -> Option<String> {
         Backend::Jack => format!("Sound goes to JACK: {name} does not open"),
         _ => format!("Sound goes to the system's output: {name} does not open"),
     };
-    Some(format!("{now} ({reason}). Choose devices in the Instrument view."))
+    Some(format!("{now} ({reason})"))
 }
 
 /// Whether windows need X11 here and it is missing.
@@ -221,23 +222,20 @@ mod tests {
         assert_eq!(problem(&wanted, &[]), None);
         let no_mic = (wanted.clone(), "Unknown input device 'Mic'. Available devices are:\nOther".to_owned());
         let here = Attempt { microphone: None, is_instead: true, ..wanted.clone() };
-        let ends = "Choose devices in the Instrument view.";
         assert_eq!(
             problem(&here, std::slice::from_ref(&no_mic)).unwrap(),
-            format!("The microphone does not open (Unknown input device 'Mic'). {ends}")
+            "The microphone does not open (Unknown input device 'Mic')"
         );
         let no_rate = (here.clone(), "no such rate".to_owned());
         let slower = Attempt { rate_hz: 48_000.0, ..here };
         assert_eq!(
             problem(&slower, &[no_mic.clone(), no_rate.clone()]).unwrap(),
-            format!(
-                "Sound goes to Card at 48000 Hz in blocks of 256: the chosen ones are refused (no such rate). {ends}"
-            )
+            "Sound goes to Card at 48000 Hz in blocks of 256: the chosen ones are refused (no such rate)"
         );
         let no_card = (slower, "busy".to_owned());
         assert_eq!(
             problem(&system(), &[no_mic, no_rate, no_card]).unwrap(),
-            format!("Sound goes to the system's output: Card does not open (busy). {ends}")
+            "Sound goes to the system's output: Card does not open (busy)"
         );
         // Automatic has tried JACK before the sound card.
         let usual = |backend| Attempt { is_instead: false, ..attempt(backend) };
@@ -245,7 +243,7 @@ mod tests {
         assert_eq!(problem(&usual(arguments::SYSTEM), std::slice::from_ref(&jack)), None);
         assert_eq!(
             problem(&Attempt::silent(), &[jack, (usual(arguments::SYSTEM), "no card".to_owned())]).unwrap(),
-            format!("No sound: the system's output does not open (no card). {ends}")
+            "No sound: the system's output does not open (no card)"
         );
     }
 

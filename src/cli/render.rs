@@ -13,7 +13,6 @@ use crate::cli::score_args::ScoreArgs;
 use crate::cli::shared_args::{whole, within};
 use crate::output::NewFile;
 use crate::wav::{BEGINNING_S, Depth, Levels, WavFile};
-use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::instrument::side_by_side::{self, Stand};
 use chalumeau_core::reed::physical::P_REF_PA;
@@ -272,15 +271,8 @@ impl RenderCommand {
 /// Whether a note is held for a tenth of a second or more after `seconds`.
 fn is_held_beyond(job: &RenderJob, seconds: f64) -> bool {
     let least = ((seconds + 0.1) * f64::from(job.rate)) as usize;
-    let mut held = std::collections::BTreeSet::new();
-    job.score.events.iter().any(|timed| match timed.event {
-        Event::NoteOn { note, .. } => {
-            held.insert(note);
-            false
-        }
-        Event::NoteOff { note } => held.remove(&note) && timed.at >= least,
-        _ => false,
-    }) || (!held.is_empty() && job.score.samples >= least)
+    let notes = job.settings.reach.key_notes(&job.model);
+    job.score.note_spans(&notes).iter().any(|span| span.to >= least)
 }
 
 /// How it was played, for the lines under a figure's title.

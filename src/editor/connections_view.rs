@@ -1,12 +1,13 @@
 //! Where sound and MIDI go and come from, in a program without a host, and lists to choose others.
 
-use egui::{RichText, Role, Ui, WidgetInfo};
+use egui::{RichText, Ui};
 
 use crate::editor::Action;
 use crate::editor::connections::{BLOCKS, Connections, DeviceChoice, OutputChoice, RATES_HZ};
 use crate::editor::controls::heading;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
+use crate::editor::widgets::list;
 
 /// What the user has chosen and not yet used, and whether the program has been asked for the devices.
 #[derive(Clone, Default)]
@@ -41,7 +42,7 @@ pub fn draw(ui: &mut Ui, connections: &Connections, actions: &mut Vec<Action>) {
     }
     outputs.extend(devices.outputs.iter().cloned().map(OutputChoice::Device));
     let tip = "Automatic is JACK if a server runs, and otherwise the system's output.";
-    list(ui, "Play to", &mut choice.output, outputs, |output| output.title().to_owned(), tip);
+    choose(ui, "Play to", &mut choice.output, outputs, |output| output.title().to_owned(), tip);
     let is_jack = choice.output == OutputChoice::Jack;
     if !is_jack {
         ui.horizontal(|ui| {
@@ -49,13 +50,13 @@ pub fn draw(ui: &mut Ui, connections: &Connections, actions: &mut Vec<Action>) {
             let tip = "Samples in a second. JACK sets its own.";
             ui.scope(|ui| {
                 ui.set_max_width(half);
-                list(ui, "Sample rate", &mut choice.rate_hz, RATES_HZ, |rate_hz| format!("{rate_hz} Hz"), tip);
+                choose(ui, "Sample rate", &mut choice.rate_hz, RATES_HZ, |rate_hz| format!("{rate_hz} Hz"), tip);
             });
             // WASAPI has a block length of its own.
             if !cfg!(windows) {
                 let tip = "Samples in a block. Small blocks respond faster, but the sound may drop out. JACK sets its own.";
                 let text = |block: &u32| format!("blocks of {block}");
-                list(ui, "Samples per block", &mut choice.block, BLOCKS, text, tip);
+                choose(ui, "Samples per block", &mut choice.block, BLOCKS, text, tip);
             }
         });
     }
@@ -63,12 +64,12 @@ pub fn draw(ui: &mut Ui, connections: &Connections, actions: &mut Vec<Action>) {
     if !is_jack {
         let inputs = std::iter::once(None).chain(devices.midi_inputs.iter().cloned().map(Some));
         let text = |input: &Option<String>| input.clone().unwrap_or_else(|| "All MIDI inputs".to_owned());
-        list(ui, "MIDI from", &mut choice.midi_input, inputs, text, "With JACK, all inputs play.");
+        choose(ui, "MIDI from", &mut choice.midi_input, inputs, text, "With JACK, all inputs play.");
         ui.label(quiet("Microphone to blow at"));
         let inputs = std::iter::once(None).chain(devices.inputs.iter().cloned().map(Some));
         let text = |input: &Option<String>| input.clone().unwrap_or_else(|| "None".to_owned());
         let tip = "With JACK, connect the port \"microphone\" in a patchbay.";
-        list(ui, "Microphone", &mut choice.microphone, inputs, text, tip);
+        choose(ui, "Microphone", &mut choice.microphone, inputs, text, tip);
     }
     if let Some(problem) = &connections.problem {
         ui.label(RichText::new(problem).color(ui.visuals().warn_fg_color));
@@ -102,8 +103,8 @@ pub fn draw(ui: &mut Ui, connections: &Connections, actions: &mut Vec<Action>) {
     ui.data_mut(|data| data.insert_temp(id, draft));
 }
 
-/// A list to open. What is chosen stands in it, even if it is not there now.
-fn list<T: Clone + PartialEq>(
+/// A list of values to open. What is chosen stands in it, even if it is not there now.
+fn choose<T: Clone + PartialEq>(
     ui: &mut Ui,
     name: &str,
     chosen: &mut T,
@@ -115,19 +116,8 @@ fn list<T: Clone + PartialEq>(
     if !options.contains(chosen) {
         options.push(chosen.clone());
     }
-    let now = text(chosen);
-    let list =
-        egui::ComboBox::from_id_salt(name).width(ui.available_width() - 8.0).truncate().selected_text(&now);
-    let response = list.show_ui(ui, |ui| {
-        for option in options {
-            let text = text(&option);
-            ui.selectable_value(chosen, option, text);
-        }
-    });
-    response.response.widget_info(|| {
-        let mut info = WidgetInfo::labeled(Role::ComboBox, true, name);
-        info.current_text_value = Some(now.clone());
-        info
-    });
-    response.response.on_hover_text(tip);
+    let texts: Vec<String> = options.iter().map(text).collect();
+    let mut index = options.iter().position(|option| option == chosen).unwrap_or(0);
+    list(ui, name, &texts, &mut index).on_hover_text(tip);
+    *chosen = options.swap_remove(index);
 }

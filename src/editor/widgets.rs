@@ -63,26 +63,30 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let response = if needed <= ui.available_width() {
         segments(ui, &look.name, &texts, &mut chosen)
     } else {
-        let list = egui::ComboBox::from_id_salt(("choice", id)).width(ui.available_width() - 8.0);
-        let list = list.selected_text(texts.get(now).cloned().unwrap_or_default());
-        let response = list.show_ui(ui, |ui| {
-            for (step, text) in texts.iter().enumerate() {
-                ui.selectable_value(&mut chosen, step, text);
-            }
-        });
-        let text = texts.get(now).cloned().unwrap_or_default();
-        response.response.widget_info(|| {
-            let mut info = WidgetInfo::labeled(Role::ComboBox, true, &look.name);
-            info.current_text_value = Some(text.clone());
-            info
-        });
-        response.response
+        list(ui, &look.name, &texts, &mut chosen)
     };
     linked_controllers::offer_menu(ui, hands, id, &response);
     if chosen != now {
         hands.put(id, chosen as f32 / steps as f32);
     }
     Some(response.on_hover_ui(|ui| teach(ui, id, "")))
+}
+
+/// A list of choices to open, as wide as there is room. Its name is what a screen reader says, and tells it from its neighbours.
+pub fn list(ui: &mut Ui, name: &str, texts: &[String], chosen: &mut usize) -> Response {
+    let text = texts.get(*chosen).cloned().unwrap_or_default();
+    let list = egui::ComboBox::from_id_salt(("list", name)).width(ui.available_width() - 8.0).truncate();
+    let response = list.selected_text(&text).show_ui(ui, |ui| {
+        for (index, text) in texts.iter().enumerate() {
+            ui.selectable_value(chosen, index, text);
+        }
+    });
+    response.response.widget_info(|| {
+        let mut info = WidgetInfo::labeled(Role::ComboBox, true, name);
+        info.current_text_value = Some(text.clone());
+        info
+    });
+    response.response
 }
 
 /// Buttons in one frame, of which one is down.

@@ -285,26 +285,26 @@ impl Args {
 
     /// The choice that the lists of the window begin with: what is in use, or, if that is not what the user has chosen, the choice.
     pub fn in_window(&self, attempt: &Attempt, kept: &DeviceChoice) -> DeviceChoice {
+        if attempt.is_instead {
+            return kept.clone();
+        }
+        let in_use = DeviceChoice {
+            rate_hz: attempt.rate_hz as u32,
+            block: attempt.block,
+            midi_input: attempt.midi_input.clone(),
+            ..kept.clone()
+        };
+        if !self.names_a_place() {
+            return in_use;
+        }
         let output = match (&attempt.output, attempt.backend) {
-            _ if !self.names_a_place() => kept.output.clone(),
             (Some(name), _) => OutputChoice::Device(name.clone()),
             (None, Backend::Jack) => OutputChoice::Jack,
             (None, SYSTEM) => OutputChoice::System,
             (None, _) => kept.output.clone(),
         };
-        if attempt.is_instead {
-            return kept.clone();
-        }
-        DeviceChoice {
-            output,
-            rate_hz: attempt.rate_hz as u32,
-            block: attempt.block,
-            microphone: match &attempt.microphone {
-                Some((name, _)) => Some(name.clone()),
-                None => kept.microphone.clone().filter(|_| !self.names_a_place()),
-            },
-            midi_input: attempt.midi_input.clone(),
-        }
+        let microphone = attempt.microphone.as_ref().map(|(name, _)| name.clone());
+        DeviceChoice { output, microphone, ..in_use }
     }
 
     /// The arguments for the framework. With JACK it runs the dummy backend at the server's rate.
@@ -344,19 +344,17 @@ impl Args {
     /// Where sound goes in this attempt, for the window. MIDI inputs come later.
     pub fn connections(&self, attempt: &Attempt) -> Connections {
         let (sound, how) = match attempt.backend {
-            Backend::Dummy => ("none", ""),
-            Backend::Auto | Backend::Jack => {
-                ("JACK", "A patchbay for JACK connects other outputs, MIDI devices and a microphone.")
-            }
+            Backend::Dummy => ("none".to_owned(), ""),
+            Backend::Auto | Backend::Jack => (
+                "JACK".to_owned(),
+                "A patchbay for JACK connects other outputs, MIDI devices and a microphone.",
+            ),
             // Where the system has no other backend, the two above are all.
             #[allow(unreachable_patterns)]
-            _ => (attempt.output.as_deref().unwrap_or("the system's output"), ""),
-        };
-        let sound = match attempt.backend {
-            Backend::Dummy | Backend::Auto | Backend::Jack => sound.to_owned(),
-            #[allow(unreachable_patterns)]
             backend => {
-                format!("{sound} ({}), {} Hz, blocks of {}", backend.name(), attempt.rate_hz, attempt.block)
+                let output = attempt.output.as_deref().unwrap_or("the system's output");
+                let (name, rate_hz, block) = (backend.name(), attempt.rate_hz, attempt.block);
+                (format!("{output} ({name}), {rate_hz} Hz, blocks of {block}"), "")
             }
         };
         let no_midi = match (attempt.backend, &attempt.midi_input, &self.connect_jack_midi_input) {
