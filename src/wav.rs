@@ -42,7 +42,7 @@ pub struct Levels {
     pub rms: f32,
     /// Number of samples clipped at full scale, of all channels; 0 for floats.
     pub clipped: u64,
-    /// Root mean square of the loudest [`WINDOW_S`] after [`BEGINNING_S`], full scale 1; `None` if the file ends before.
+    /// Root mean square of the loudest 0.05 s after [`BEGINNING_S`], full scale 1; `None` if the file ends before.
     pub after_beginning: Option<f32>,
 }
 
