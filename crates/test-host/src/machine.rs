@@ -34,6 +34,16 @@ pub fn cargo() -> Command {
     command
 }
 
+/// A program that, if it is to, gives way to others that want a core, where the system has a word for it.
+pub fn giving_way(program: &Path, it_does: bool) -> Command {
+    if !(it_does && cfg!(unix)) {
+        return Command::new(program);
+    }
+    let mut command = Command::new("nice");
+    command.args(["-n", "19"]).arg(program);
+    command
+}
+
 /// Runs a command to its end; anything but success is an error that names it.
 pub fn run(command: &mut Command) -> Result<()> {
     let name = described(command);
