@@ -28,6 +28,7 @@ mod instrument;
 mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
+mod measure;
 pub mod offline;
 mod parameters;
 mod plot_args;
@@ -82,6 +83,7 @@ Examples:
   chalumeau bore --written C5 --plot c5.svg
   chalumeau threshold --all --zeta 0.3
   chalumeau tune --rate 48000 --gamma 0.5
+  chalumeau measure recording.wav --plot recording.png
   chalumeau haptic --all --contrast 1
 
 Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads *written* notes, which \
@@ -112,6 +114,7 @@ enum Command {
     Bifurcation(Box<bifurcation::BifurcationCommand>),
     Tune(Box<tune::TuneCommand>),
     Realism(Box<realism::RealismCommand>),
+    Measure(measure::MeasureCommand),
     Reed(reed::ReedCommand),
     Study(study::StudyCommand),
     Parameters(parameters::ParametersCommand),
@@ -180,6 +183,8 @@ enum Failure {
     Report { path: PathBuf, source: ReportError },
     #[error(transparent)]
     Wav(#[from] WavError),
+    #[error("{}: {source}", path.display())]
+    WavFile { path: PathBuf, source: crate::wav::Unreadable },
     #[error(transparent)]
     Reed(#[from] ReedError),
     #[cfg(feature = "simulator")]
@@ -276,6 +281,7 @@ pub fn main() -> ExitCode {
         Command::Bifurcation(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Realism(command) => command.run(),
+        Command::Measure(command) => command.run(),
         Command::Reed(command) => command.run(),
         Command::Study(command) => command.run(),
         Command::Parameters(command) => command.run(),

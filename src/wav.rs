@@ -1,4 +1,5 @@
-//! Writes WAV files: 16 or 24 bit integers, rounded to nearest without dither, or unchanged 32 bit floats.
+//! Writes WAV files: 16 or 24 bit integers, rounded to nearest without dither, or unchanged 32 bit floats. Reads those of
+//! others.
 
 use hound::{SampleFormat, WavSpec, WavWriter};
 use std::io::{BufWriter, Seek, Write};
@@ -153,6 +154,91 @@ pub fn is_whole(path: &Path, seconds: f64, rate: u32) -> bool {
         }
 }
 
+/// A recording that was read.
+pub struct Recording {
+    /// Sample rate, Hz.
+    pub rate: u32,
+    /// Channels of the file.
+    pub channels: u16,
+    /// Length of the file, s.
+    pub seconds: f64,
+    /// One channel, or the mean of all; full scale 1.
+    pub samples: Vec<f64>,
+}
+
+/// Why a recording cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum Unreadable {
+    /// It is missing, damaged, or of another format.
+    #[error(
+        "not a WAV file that can be read ({0}); another format has to be converted first, for example with ffmpeg -i FILE sound.wav"
+    )]
+    Format(hound::Error),
+    /// The system reports an error.
+    #[error("cannot be read: {0}")]
+    Read(std::io::Error),
+    /// There is no such channel.
+    #[error("the file has {has} channel{}, and channel {wanted} is asked for", if *has == 1 { "" } else { "s" })]
+    Channel {
+        /// Counted from 1.
+        wanted: u16,
+        /// As many as there are.
+        has: u16,
+    },
+    /// Nothing lies between the times.
+    #[error("the file has {seconds:.2} s, and nothing of it lies between {from_s} s and {to_s} s")]
+    Nothing {
+        /// Length of the file, s.
+        seconds: f64,
+        /// Asked for, s.
+        from_s: f64,
+        /// Asked for, s.
+        to_s: f64,
+    },
+}
+
+impl From<hound::Error> for Unreadable {
+    fn from(error: hound::Error) -> Self {
+        match error {
+            // The system's own errors have a number; that a file ends too soon is the reader's.
+            hound::Error::IoError(error) if error.raw_os_error().is_some() => Self::Read(error),
+            error => Self::Format(error),
+        }
+    }
+}
+
+/// Reads one channel (counted from 1) of a file of any integer depth or 32 bit floats, or the mean of all, from one time to
+/// another, s.
+pub fn read(path: &Path, channel: Option<u16>, from_s: f64, to_s: f64) -> Result<Recording, Unreadable> {
+    let mut reader = hound::WavReader::open(path)?;
+    let WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format } = reader.spec();
+    if let Some(wanted) = channel.filter(|channel| !(1..=channels).contains(channel)) {
+        return Err(Unreadable::Channel { wanted, has: channels });
+    }
+    let (length, per_s) = (reader.duration(), f64::from(rate));
+    let at = |s: f64| (s * per_s).round().clamp(0.0, f64::from(length)) as u32;
+    let (from, to) = (at(from_s), at(to_s));
+    if from >= to {
+        return Err(Unreadable::Nothing { seconds: f64::from(length) / per_s, from_s, to_s });
+    }
+    reader.seek(from).map_err(Unreadable::Read)?;
+    let count = (to - from) as usize * usize::from(channels);
+    let all: Vec<f32> = match sample_format {
+        SampleFormat::Float => reader.samples::<f32>().take(count).collect::<Result<_, _>>()?,
+        SampleFormat::Int => {
+            let full = f64::from(bits_per_sample.saturating_sub(1)).exp2();
+            let sample = |sample: Result<i32, _>| sample.map(|sample| (f64::from(sample) / full) as f32);
+            reader.samples::<i32>().take(count).map(sample).collect::<Result<_, _>>()?
+        }
+    };
+    let frames = all.chunks_exact(usize::from(channels));
+    let samples = frames.map(|frame| match channel {
+        Some(channel) => f64::from(frame[usize::from(channel) - 1]),
+        None => frame.iter().map(|&sample| f64::from(sample)).sum::<f64>() / f64::from(channels),
+    });
+    Ok(Recording { rate, channels, seconds: f64::from(length) / per_s, samples: samples.collect() })
+}
+
 /// Scales -1..=1 to integer full scale, rounds to nearest and clips.
 fn round(sample: f32, full_scale: f64) -> i32 {
     (f64::from(sample).clamp(-1.0, 1.0) * full_scale).round() as i32
@@ -244,6 +330,40 @@ mod tests {
                 assert!(!is_whole(&path, 0.01, 48_000), "{depth:?}, {length} bytes");
             }
         }
+    }
+
+    #[test]
+    fn what_was_written_is_read() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x.wav");
+        for (depth, step) in [(Depth::Int16, 3.1e-5), (Depth::Int24, 1.3e-7), (Depth::Float32, 1e-9)] {
+            let mut file = NewFile::create(&path, true).unwrap();
+            let mut wav = WavFile::new(&mut file, 48_000, depth, 2, 480).unwrap();
+            let left: Vec<f32> = (0..480).map(|n| n as f32 / 960.0).collect();
+            wav.write(&[&left, &[-0.25; 480]]).unwrap();
+            wav.finish().unwrap();
+            file.keep().unwrap();
+            let right = read(&path, Some(2), 0.0, 1.0).unwrap();
+            assert_eq!((right.rate, right.channels, right.samples.len()), (48_000, 2, 480));
+            assert!(right.samples.iter().all(|sample| (sample + 0.25).abs() < step), "{depth:?}");
+            let part = read(&path, None, 0.005, 0.006).unwrap();
+            assert_eq!(part.samples.len(), 48);
+            assert!((part.samples[0] - 0.5 * (0.25 - 0.25)).abs() < step, "{depth:?}");
+            assert!((part.samples[47] - 0.5 * (287.0 / 960.0 - 0.25)).abs() < step, "{depth:?}");
+            assert!(matches!(read(&path, Some(3), 0.0, 1.0), Err(Unreadable::Channel { wanted: 3, has: 2 })));
+            assert!(matches!(read(&path, None, 1.0, 2.0), Err(Unreadable::Nothing { .. })));
+            let bytes = std::fs::read(&path).unwrap();
+            for length in [bytes.len() - 1, 30, 0] {
+                std::fs::write(&path, &bytes[..length]).unwrap();
+                assert!(
+                    matches!(read(&path, None, 0.0, 1.0), Err(Unreadable::Format(_))),
+                    "{depth:?}, {length} bytes"
+                );
+            }
+        }
+        std::fs::write(&path, "ID3 and not a WAV file at all, as one sees").unwrap();
+        assert!(matches!(read(&path, None, 0.0, 1.0), Err(Unreadable::Format(_))));
+        assert!(matches!(read(&directory.path().join("no.wav"), None, 0.0, 1.0), Err(Unreadable::Read(_))));
     }
 
     #[test]

@@ -31,6 +31,50 @@ fn a_report_has_the_pitch_that_sounds() {
     }
 }
 
+/// A piece that was rendered is measured note by note, as it was written down.
+#[test]
+fn the_notes_of_a_recording_are_those_that_were_played() {
+    let d = tempfile::tempdir().unwrap();
+    let smf = fs::read(MELODY).unwrap();
+    let smf = midly::Smf::parse(&smf).unwrap();
+    let played: Vec<u8> = (smf.tracks.iter().flatten())
+        .filter_map(|event| match event.kind {
+            midly::TrackEventKind::Midi { message: midly::MidiMessage::NoteOn { key, vel }, .. }
+                if vel > 0 =>
+            {
+                Some(key.as_int())
+            }
+            _ => None,
+        })
+        .collect();
+    succeeds(d.path(), &format!("render {MELODY} --out melody.wav"));
+    let table = succeeds(d.path(), "measure melody.wav --plot melody.svg");
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
+        .map(|line| line.split(',').collect())
+        .collect();
+    let heard: Vec<u8> = rows.iter().map(|row| row[2].parse().unwrap()).collect();
+    assert_eq!(heard, played);
+    for row in &rows {
+        assert!(row[5].parse::<f64>().unwrap().abs() < 5.0, "{row:?}");
+        assert_eq!(row.len(), 21);
+    }
+    assert!(fs::read_to_string(d.path().join("melody.svg")).unwrap().contains("melody.wav"));
+
+    let part = succeeds(d.path(), "measure melody.wav --from 16 --to 18");
+    assert!(part.lines().nth(2).unwrap().starts_with("16."), "{part}");
+    fs::write(d.path().join("song.mp3"), "ID3").unwrap();
+    refused(&d, "measure song.mp3", &["song.mp3", "not a WAV file", "converted first"]);
+    refused(&d, "measure none.wav", &["none.wav", "cannot be read"]);
+    refused(&d, "measure melody.wav --channel 2", &["1 channel, and channel 2"]);
+    refused(&d, "measure melody.wav --from 99", &["29.20 s", "nothing of it"]);
+    refused(&d, "measure melody.wav --from 5 --to 4", &["--to 4 must lie after --from 5"]);
+    refused(&d, "measure melody.wav --csv melody.wav --force", &["melody.wav is read by this command"]);
+    let quiet = told(d.path(), "measure melody.wav --to 0.2 --csv none.csv");
+    assert!(quiet.contains("no note was found"), "{quiet}");
+}
+
 /// What a fingering's row says can be written into an instrument file.
 #[test]
 fn fingerings_count_resonances_as_instrument_files_do() {

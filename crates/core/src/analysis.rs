@@ -25,6 +25,7 @@ pub mod onset;
 pub mod overview;
 pub mod partials;
 pub mod pitch;
+pub mod recording;
 #[cfg(feature = "fit")]
 pub(crate) mod slower;
 pub mod spectrum;

@@ -42,6 +42,7 @@ pub mod impedance;
 pub mod palette;
 pub mod performance;
 pub mod realism;
+pub mod recording;
 pub mod reed;
 pub mod reed_orbit;
 pub mod reed_sweep;

@@ -1,0 +1,136 @@
+//! The notes of a recording: pitch and level over time, and the harmonics of each note.
+
+use crate::palette::Colour;
+use crate::{Axis, Dash, Figure, Line, Panel, Points, Shape};
+use chalumeau_core::analysis::pitch::TrackPoint;
+use chalumeau_core::analysis::recording::Note;
+use chalumeau_core::units::cents;
+
+/// Softer moments have no level worth drawing, dB re the loudest.
+const SOFT_DB: f64 = -60.0;
+/// A line breaks where the pitch jumps by more, cents.
+const JUMP_CENTS: f64 = 60.0;
+/// As many notes have harmonics of their own; of more, the mean is drawn.
+const MOST: usize = 6;
+
+const LOOKS: [(Colour, Dash, Shape); MOST] = [
+    (Colour::Blue, Dash::Solid, Shape::Disc),
+    (Colour::Vermilion, Dash::Dashed, Shape::Diamond),
+    (Colour::Green, Dash::Dotted, Shape::TriangleUp),
+    (Colour::Purple, Dash::Solid, Shape::Ring),
+    (Colour::Sky, Dash::Dashed, Shape::Cross),
+    (Colour::Orange, Dash::Dotted, Shape::Disc),
+];
+
+/// Three panels. `names` are those of the notes; `a4_hz` is the pitch of A4, `from_s` the time of the first sample in the file.
+pub fn figure(
+    title: &str,
+    remark: &str,
+    notes: &[Note],
+    names: &[String],
+    track: &[TrackPoint],
+    a4_hz: f64,
+    from_s: f64,
+) -> Figure {
+    let midi = |hz: f64| 69.0 + cents(hz, a4_hz) / 100.0;
+    let loudest = track.iter().map(|point| point.rms).fold(1e-9, f64::max);
+    let level = |point: &TrackPoint| 20.0 * (point.rms / loudest).log10();
+    let mut played: Vec<(f64, f64)> = Vec::new();
+    for point in track {
+        let is_of_a_note = notes.iter().any(|note| (note.start_s..note.end_s).contains(&point.t_s));
+        let Some(hz) = point.hz.filter(|_| is_of_a_note) else {
+            played.push((from_s + point.t_s, f64::NAN));
+            continue;
+        };
+        let jumps = played.last().is_some_and(|(_, last)| 100.0 * (midi(hz) - last).abs() > JUMP_CENTS);
+        if jumps {
+            played.push((from_s + point.t_s, f64::NAN));
+        }
+        played.push((from_s + point.t_s, midi(hz)));
+    }
+    let held = notes.iter().flat_map(|note| {
+        let at = midi(note.f0_hz);
+        [(from_s + note.start_s, at), (from_s + note.end_s, at), (from_s + note.end_s, f64::NAN)]
+    });
+    let pitch = Panel::new("Pitch", Axis::linear("time, s"), Axis::notes("sounding note"))
+        .with(Line::new("mean of each note", held).colour(Colour::Sky).width(6.0))
+        .with(Line::new("every 10 ms", played).colour(Colour::Ink).width(1.5));
+    let levels = track.iter().map(|point| {
+        let level = level(point);
+        let full = level + 20.0 * loudest.log10();
+        (from_s + point.t_s, if level > SOFT_DB { full } else { f64::NAN })
+    });
+    let level = Panel::new("Level", Axis::linear("time, s"), Axis::linear("dB re full scale"))
+        .with(Line::new("", levels).colour(Colour::Blue));
+    Figure::new(title)
+        .note(remark)
+        .panel(pitch.weight(1.5))
+        .panel(level)
+        .panel(harmonics(notes, names, from_s))
+        .size(1_400, 1_500)
+}
+
+/// Levels of the harmonics of a few notes, or their mean.
+fn harmonics(notes: &[Note], names: &[String], from_s: f64) -> Panel {
+    let axis = || Axis::linear("dB re the strongest");
+    if notes.len() > MOST {
+        let most = notes.iter().map(|note| note.levels_db.len()).max().unwrap_or(0);
+        let mean = (0..most).map(|index| {
+            let levels: Vec<f64> =
+                notes.iter().filter_map(|note| note.levels_db.get(index).copied()).collect();
+            ((index + 1) as f64, levels.iter().sum::<f64>() / levels.len() as f64)
+        });
+        let mean: Vec<_> = mean.collect();
+        let title = format!("Harmonics, mean of {} notes", notes.len());
+        return Panel::new(title, Axis::linear("harmonic"), axis())
+            .with(Line::new("", mean.clone()).colour(Colour::Blue))
+            .with(Points::new("", mean).colour(Colour::Blue));
+    }
+    let mut panel = Panel::new("Harmonics", Axis::linear("harmonic"), axis());
+    for ((note, name), (colour, dash, shape)) in notes.iter().zip(names).zip(LOOKS) {
+        let levels: Vec<_> = (1..).map(f64::from).zip(note.levels_db.iter().copied()).collect();
+        let name = format!("{name} at {:.1} s", from_s + note.start_s);
+        panel = panel
+            .with(Line::new(name, levels.clone()).colour(colour).dash(dash))
+            .with(Points::new("", levels).colour(colour).shape(shape));
+    }
+    panel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Layer;
+
+    fn note(start_s: f64, f0_hz: f64) -> Note {
+        Note {
+            start_s,
+            end_s: start_s + 0.5,
+            f0_hz,
+            level_dbfs: -20.0,
+            attack_s: 0.05,
+            centroid_hz: 900.0,
+            levels_db: vec![0.0, -30.0, -6.0],
+        }
+    }
+
+    #[test]
+    fn a_leap_breaks_the_line_and_few_notes_have_harmonics_of_their_own() {
+        let track: Vec<_> = (0..100)
+            .map(|n| TrackPoint {
+                t_s: 0.01 * f64::from(n),
+                hz: Some(if n < 50 { 220.0 } else { 330.0 }),
+                rms: 0.1,
+            })
+            .collect();
+        let names = ["A3".to_owned(), "E4".to_owned()];
+        let two = figure("x.wav", "", &[note(0.0, 220.0), note(0.5, 330.0)], &names, &track, 440.0, 2.0);
+        let Layer::Line(line) = &two.panels[0].layers[1] else { panic!("no line") };
+        assert_eq!(line.pieces.iter().map(Vec::len).collect::<Vec<_>>(), [50, 50]);
+        assert!((line.pieces[0][0][0] - 2.0).abs() < 1e-9);
+        assert_eq!(two.panels[2].layers.len(), 4);
+        let many: Vec<_> = (0..9).map(|n| note(f64::from(n), 220.0)).collect();
+        let many = figure("x.wav", "", &many, &vec!["A3".to_owned(); 9], &track, 440.0, 0.0);
+        assert_eq!(many.panels[2].layers.len(), 2);
+    }
+}

@@ -1,0 +1,123 @@
+//! `chalumeau measure`: the notes of a recording.
+
+use crate::cli::Failure;
+use crate::cli::csv_table::{TableArgs, named, number};
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::shared_args::within;
+use crate::wav;
+use chalumeau_core::analysis::recording::{self, Note};
+use chalumeau_core::analysis::spectrum::HARMONICS;
+use chalumeau_core::units::{SoundingNote, cents};
+use clap::Args;
+use std::path::PathBuf;
+
+/// The longest part that is measured, s: ten minutes need 1 GB.
+const LONGEST_S: f64 = 600.0;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau measure recording.wav --plot recording.png
+  chalumeau measure recording.wav --from 12 --to 20 --a4 442 --csv notes.csv
+  chalumeau render examples/melody.mid --out melody.wav && chalumeau measure melody.wav";
+
+/// Find the notes of a recording: pitch, level, attack, harmonics
+///
+/// For any WAV file with one voice: a clarinet before a microphone, or what `chalumeau render` wrote. Each line of the table is a
+/// note as it *sounds*; a B flat clarinet reads it two semitones higher. Cents are against equal temperament at --a4. The level is that of the
+/// steady part, dB re full scale. The attack is the time from the beginning to 90 % of that level, short in a slur. The centroid is
+/// the power-weighted mean frequency, noise included. h1_db to h12_db are the harmonics, dB re the strongest. Chords, and voices with
+/// accompaniment, give wrong notes or none.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct MeasureCommand {
+    /// The recording, a WAV file
+    #[arg(value_name = "FILE")]
+    recording: PathBuf,
+    /// Measure from here on, s
+    #[arg(long, value_name = "S", default_value = "0", value_parser = |s: &str| within(s, 0.0, 86_400.0))]
+    from: f64,
+    /// Measure up to here, s, at most 600 after --from [default: the end]
+    #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 86_400.0))]
+    to: Option<f64>,
+    /// Measure one channel, from 1 on [default: the mean of all]
+    #[arg(long, value_name = "N")]
+    channel: Option<u16>,
+    /// Pitch of A4, Hz, 380..500
+    #[arg(long, value_name = "HZ", default_value = "440", value_parser = |s: &str| within(s, 380.0, 500.0))]
+    a4: f64,
+    #[command(flatten)]
+    table: TableArgs,
+    #[command(flatten)]
+    plot: PlotArgs,
+}
+
+impl MeasureCommand {
+    pub fn run(&self) -> Result<(), Failure> {
+        let path = &self.recording;
+        self.table.check_files(&[Some(path)], &[self.plot.path()])?;
+        let to_s = self.to.unwrap_or(self.from + LONGEST_S);
+        if !(self.from < to_s && to_s <= self.from + LONGEST_S) {
+            return Err(Failure::Usage(format!(
+                "--to {to_s} must lie after --from {}, by at most {LONGEST_S} s",
+                self.from
+            )));
+        }
+        let read = wav::read(path, self.channel, self.from, to_s);
+        let sound = read.map_err(|source| Failure::WavFile { path: path.clone(), source })?;
+        if self.to.is_none() && sound.seconds > to_s {
+            say!(
+                "note: of {:.0} s only the {LONGEST_S} s from {} s on are measured; --from and --to choose others",
+                sound.seconds,
+                self.from
+            );
+        }
+        let plot = self.plot.open(self.table.force())?;
+        let harmonics: Vec<_> = (1..=HARMONICS).map(|n| format!("h{n}_db")).collect();
+        let columns = "start_s,end_s,sounding_midi,name,f_hz,cents,level_dbfs,attack_s,centroid_hz";
+        let mut table = self.table.open(&format!("{columns},{}", harmonics.join(",")))?;
+        let (notes, track) = recording::notes(&sound.samples, f64::from(sound.rate));
+        let channel = match self.channel {
+            Some(channel) => format!("channel {channel} of {}", sound.channels),
+            None if sound.channels == 1 => "mono".to_owned(),
+            None => format!("mean of {} channels", sound.channels),
+        };
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        let remark = format!("{channel}, {} Hz, A4 = {} Hz; {} notes", sound.rate, self.a4, notes.len());
+        table.comment(format_args!("{name}: {remark}, as they sound"))?;
+        let mut names = Vec::new();
+        for note in &notes {
+            let (sounding, off_cents) = self.nearest(note);
+            names.push(sounding.to_string());
+            let levels =
+                (0..HARMONICS).map(|n| number(note.levels_db.get(n).copied().unwrap_or(f64::NAN), 1));
+            table.line(format_args!(
+                "{:.3},{:.3},{},{},{:.3},{off_cents:.2},{:.2},{:.3},{:.1},{}",
+                self.from + note.start_s,
+                self.from + note.end_s,
+                sounding.0,
+                named(sounding),
+                note.f0_hz,
+                note.level_dbfs,
+                note.attack_s,
+                note.centroid_hz,
+                levels.collect::<Vec<_>>().join(",")
+            ))?;
+        }
+        table.finish()?;
+        if notes.is_empty() {
+            say!(
+                "note: no note was found: a note lasts 0.05 s or more, has a pitch between 50 and 2500 Hz, and sounds alone"
+            );
+        }
+        plot.draw(|| {
+            chalumeau_figure::recording::figure(&name, &remark, &notes, &names, &track, self.a4, self.from)
+        })
+    }
+
+    /// The note of equal temperament that is nearest, and how far above it the sound is, cents.
+    fn nearest(&self, note: &Note) -> (SoundingNote, f64) {
+        let above_a4 = cents(note.f0_hz, self.a4);
+        let steps = (above_a4 / 100.0).round();
+        (SoundingNote((69.0 + steps).clamp(0.0, 127.0) as u8), above_a4 - 100.0 * steps)
+    }
+}
