@@ -10,6 +10,18 @@ use std::io;
 use std::io::{BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 
+/// What files of other endings are.
+const OTHERS: [(&str, &str); 8] = [
+    ("png", "a picture"),
+    ("svg", "a picture"),
+    ("gif", "a picture"),
+    ("wav", "a sound"),
+    ("mid", "a MIDI file"),
+    ("toml", "an instrument or a plan"),
+    ("json", "the data of a figure"),
+    ("html", "a page"),
+];
+
 /// Where a table goes.
 #[derive(Args)]
 pub struct TableArgs {
@@ -35,7 +47,15 @@ impl TableArgs {
     /// Refuses names of the table and of other results that cannot be meant, before anything is measured. `read` is what the
     /// command reads.
     pub fn check_files(&self, read: &[MaybeFile], others: &[MaybeFile]) -> Result<(), Failure> {
-        files::check(files::READ, read, &[&[self.path()], others].concat(), self.force)
+        files::check(files::READ, read, &[&[self.path()], others].concat(), self.force)?;
+        let ending = self.csv.extension().unwrap_or_default().to_ascii_lowercase();
+        match OTHERS.iter().find(|(other, _)| ending == *other) {
+            Some((_, what)) => Err(Failure::Usage(format!(
+                "--csv {}: a file of this name would be {what}; a table is called .csv, .tsv or .txt",
+                self.csv.display()
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// Whether existing files may be replaced.

@@ -11,7 +11,7 @@ use crate::cli::idle_settings::{self, Idle};
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
-use crate::cli::silent_keys::silent_notes;
+use crate::cli::silent_keys::{hidden_in_chords, silent_notes};
 use crate::cli::threshold::linear_threshold;
 use crate::controllers::{ControllerMap, as_links};
 use crate::presets::{self, Preset};
@@ -223,6 +223,7 @@ impl ScoreArgs {
             Arc::make_mut(&mut model).keys = keys;
         }
         warnings.extend(silent_notes(&parts.events, &unplayed, &model, settings.reach));
+        warnings.extend(hidden_in_chords(&parts.events, &model, settings.reach));
         if let Some(take) = &take {
             let piece_s = parts.samples as f64 / f64::from(self.rate);
             if take.seconds() + SHORT_TAKE_S < piece_s {

@@ -24,6 +24,28 @@ pub fn silent_notes(
     silent_keys(&asked.collect::<Vec<_>>(), model, reach)
 }
 
+/// Says how many notes are not heard because another begins in the same moment: one player plays one note at a time, and of keys
+/// that are struck together the last.
+pub fn hidden_in_chords(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Option<String> {
+    let key = |timed: &Timed<PartEvent>| match timed.event.event {
+        Event::NoteOn { note, .. } => reach.fingering(note, model).map(|_| note),
+        _ => None,
+    };
+    let is_hidden = |at: usize| {
+        let Some(note) = key(&events[at]) else { return false };
+        let together = events[at + 1..].iter().take_while(|other| other.at == events[at].at);
+        let mut same_part = together.filter(|other| other.event.to == events[at].event.to);
+        same_part.any(|other| key(other).is_some_and(|other| other != note))
+    };
+    let count = (0..events.len()).filter(|&at| is_hidden(at)).count();
+    (count > 0).then(|| {
+        format!(
+            "{} not heard: another begins in the same moment. A clarinet plays one note at a time, of a chord the last in the file",
+            if count == 1 { "1 note is".to_owned() } else { format!("{count} notes are") }
+        )
+    })
+}
+
 /// Says which of these keys the instrument cannot play, which stay silent.
 pub fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -> Vec<String> {
     let file = &model.file;

@@ -75,6 +75,39 @@ fn the_notes_of_a_recording_are_those_that_were_played() {
     assert!(quiet.contains("no note was found"), "{quiet}");
 }
 
+/// Of C4 E4 G4 struck together only G4 is heard, and of D4 and E4 a moment later both.
+#[test]
+fn notes_that_chords_hide_are_told() {
+    use midly::{Format, Header, MetaMessage, MidiMessage, Smf, Timing, TrackEvent, TrackEventKind};
+    let d = tempfile::tempdir().unwrap();
+    let on = |delta: u32, key: u8, vel: u8| TrackEvent {
+        delta: delta.into(),
+        kind: TrackEventKind::Midi {
+            channel: 0.into(),
+            message: MidiMessage::NoteOn { key: key.into(), vel: vel.into() },
+        },
+    };
+    let end = TrackEvent { delta: 0.into(), kind: TrackEventKind::Meta(MetaMessage::EndOfTrack) };
+    let write = |name: &str, chord: &[u8]| {
+        let mut track: Vec<_> = chord.iter().map(|&key| on(0, key, 80)).collect();
+        track.push(on(96, chord[0], 0));
+        track.extend(chord[1..].iter().map(|&key| on(0, key, 0)));
+        track.extend([on(96, 62, 80), on(10, 64, 80), on(96, 62, 0), on(0, 64, 0), end]);
+        let header = Header::new(Format::SingleTrack, Timing::Metrical(96.into()));
+        Smf { header, tracks: vec![track] }.save(d.path().join(name)).unwrap();
+    };
+    write("chord.mid", &[60, 64, 67]);
+    write("two.mid", &[60, 64]);
+    write("note.mid", &[60]);
+    let said = told(d.path(), "render chord.mid --out x.wav --force");
+    assert!(said.contains("warning: 2 notes are not heard"), "{said}");
+    let said = told(d.path(), "render two.mid --out x.wav --force");
+    assert!(said.contains("warning: 1 note is not heard"), "{said}");
+    let said = told(d.path(), "render note.mid --out x.wav --force");
+    assert!(!said.contains("not heard"), "{said}");
+    refused(&d, "tune --written E3 --csv x.wav --force", &["x.wav", "would be a sound", ".csv"]);
+}
+
 /// What a fingering's row says can be written into an instrument file.
 #[test]
 fn fingerings_count_resonances_as_instrument_files_do() {
