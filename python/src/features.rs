@@ -1,8 +1,8 @@
-//! Measurements of a rendered note, by the methods that the project's own tables use.
+//! Measurements of a note and of a recording, by the methods that the project's own tables use.
 
 use crate::mistakes::wrong;
 use chalumeau_core::analysis::onset::attack_s;
-use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::{pitch, recording};
 use chalumeau_core::analysis::spectrum::{centroid_hz, harmonic_levels_db, rms_dbfs, steady_segment};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -16,13 +16,11 @@ pub fn features<'py>(
     rate_hz: f64,
     near_hz: Option<f64>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    if !(1_000.0..=1_536_000.0).contains(&rate_hz) {
-        return Err(wrong(format_args!("rate must lie in 1000..1536000 Hz, got {rate_hz}")));
-    }
+    check_rate(rate_hz)?;
     if let Some(near_hz) = near_hz.filter(|near_hz| !(10.0..=5_000.0).contains(near_hz)) {
         return Err(wrong(format_args!("near must lie in 10..5000 Hz, got {near_hz}")));
     }
-    let samples: Vec<f64> = samples.as_array().iter().map(|&sample| f64::from(sample)).collect();
+    let samples = to_f64(&samples);
     let (f0_hz, centroid, attack, level, harmonics) = py.detach(|| {
         let steady = steady_segment(&samples, rate_hz).map(|range| &samples[range]);
         let f0_hz = steady.and_then(|steady| match near_hz {
@@ -40,4 +38,39 @@ pub fn features<'py>(
     dict.set_item("attack_s", attack.unwrap_or(f64::NAN))?;
     dict.set_item("harmonics_db", harmonics)?;
     Ok(dict)
+}
+
+/// The notes of a recording of one voice.
+#[pyfunction]
+pub fn find_notes<'py>(
+    py: Python<'py>,
+    samples: PyReadonlyArray1<'py, f32>,
+    rate_hz: f64,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    check_rate(rate_hz)?;
+    let samples = to_f64(&samples);
+    let (notes, _) = py.detach(|| recording::notes(&samples, rate_hz));
+    let dict = |note: recording::Note| {
+        let dict = PyDict::new(py);
+        dict.set_item("start_s", note.start_s)?;
+        dict.set_item("end_s", note.end_s)?;
+        dict.set_item("f0_hz", note.f0_hz)?;
+        dict.set_item("level_dbfs", note.level_dbfs)?;
+        dict.set_item("attack_s", note.attack_s)?;
+        dict.set_item("centroid_hz", note.centroid_hz)?;
+        dict.set_item("harmonics_db", note.levels_db)?;
+        Ok(dict)
+    };
+    notes.into_iter().map(dict).collect()
+}
+
+fn check_rate(rate_hz: f64) -> PyResult<()> {
+    match (1_000.0..=1_536_000.0).contains(&rate_hz) {
+        true => Ok(()),
+        false => Err(wrong(format_args!("rate must lie in 1000..1536000 Hz, got {rate_hz}"))),
+    }
+}
+
+fn to_f64(samples: &PyReadonlyArray1<'_, f32>) -> Vec<f64> {
+    samples.as_array().iter().map(|&sample| f64::from(sample)).collect()
 }

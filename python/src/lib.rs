@@ -78,6 +78,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(reed::reed_tables, module)?)?;
     module.add_function(wrap_pyfunction!(reed::reed_flow, module)?)?;
     module.add_function(wrap_pyfunction!(features::features, module)?)?;
+    module.add_function(wrap_pyfunction!(features::find_notes, module)?)?;
     module.add_function(wrap_pyfunction!(rows::rows, module)?)?;
     module.add_function(wrap_pyfunction!(rows::check, module)?)?;
     module.add_function(wrap_pyfunction!(rows::check_rendering, module)?)?;

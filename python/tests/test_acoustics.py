@@ -1,5 +1,7 @@
 """The physics: the numbers of the command line, and what must hold of them."""
 
+import csv
+
 import chalumeau
 import numpy as np
 import pytest
@@ -73,6 +75,24 @@ def test_reed_tables_and_flow_are_those_of_the_command_line(table):
         np.testing.assert_allclose(tables[name], said[column], rtol=1e-15, err_msg=name)
     law = table("reed", "--law", "--H", "3", "--k", "0.3849")
     np.testing.assert_allclose(chalumeau.reed_flow(law["p"], H=3, k=0.3849), law["u"], rtol=1e-12, atol=1e-12)
+
+
+def test_the_notes_of_a_recording_are_those_of_the_command(tmp_path, root, chalumeau_says):
+    melody = root / "examples" / "melody.mid"
+    sound = chalumeau.render(melody)
+    found = chalumeau.find_notes(sound)
+    # The command reads a WAV file of the same samples.
+    wav = tmp_path / "melody.wav"
+    chalumeau_says("render", str(melody), "--out", str(wav))
+    lines = chalumeau_says("measure", str(wav)).splitlines()
+    said = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert len(found) == len(said) > 50
+    for name, column, places in (("f0_hz", "f_hz", 3), ("start_s", "start_s", 3), ("level_dbfs", "level_dbfs", 2), ("centroid_hz", "centroid_hz", 1)):
+        columns = [float(row[column]) for row in said]
+        np.testing.assert_allclose([note[name] for note in found], columns, rtol=0, atol=0.51 * 10.0**-places, err_msg=name)
+    with pytest.raises(ValueError, match="rate must lie in"):
+        chalumeau.find_notes(sound, 10)
+    assert chalumeau.find_notes(np.zeros(48_000)) == []
 
 
 def test_features_of_a_synthetic_tone():

@@ -5,7 +5,7 @@ The same model that plays in the Chalumeau plugin, for research and teaching:
 - `render` and `Clarinet` make sound, as 32-bit float arrays, full scale 1.0;
 - `impedance`, `impedance_peaks`, `thresholds`, `bifurcation` show the physics;
 - `reed_tables`, `reed_flow` are the reed's law, `feel` and `torque` are what a knob makes of it;
-- `features` measures a note, `dataset` renders and measures thousands.
+- `features` measures a note, `find_notes` those of a recording, `dataset` renders and measures thousands.
 
 The same arguments give the same samples, to the bit. Notes are MIDI numbers or names such as ``"C4"``, ``"F#5"``, ``"Bb3"``.
 A clarinet in B flat sounds two semitones below what is written. Arguments called ``written`` are what a player reads, those
@@ -28,6 +28,7 @@ from chalumeau.acoustics import (
     bifurcation,
     features,
     feel,
+    find_notes,
     impedance,
     impedance_peaks,
     reed_flow,
@@ -60,6 +61,7 @@ __all__ = [
     "dataset",
     "features",
     "feel",
+    "find_notes",
     "fingerings",
     "impedance",
     "impedance_peaks",

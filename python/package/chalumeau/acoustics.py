@@ -248,6 +248,26 @@ def features(samples: npt.ArrayLike, rate: float = 48_000, *, near: float | None
     >>> levels[1] < levels[2]    # the second harmonic is weaker than the third
     True
     """
+    return _native.features(_mono(samples), number("rate", rate), None if near is None else number("near", near))
+
+
+def find_notes(samples: npt.ArrayLike, rate: float = 48_000) -> list[dict[str, Any]]:
+    """Finds the notes of a recording of one voice, as ``chalumeau measure`` does: mono samples of shape ``(samples,)``, full scale 1.0.
+
+    Returns for each note, in their order, ``start_s``, ``end_s``, ``f0_hz`` (mean fundamental of the steady part), ``level_dbfs`` (its rms
+    level), ``attack_s`` (from the beginning to 90 % of that level, short in a slur), ``centroid_hz`` (power-weighted mean frequency)
+    and ``harmonics_db``: the levels of harmonics 1 to 12 over the strongest of them. A note lasts 50 ms or more and has a pitch between 50
+    and 2500 Hz. Chords give wrong notes or none. Raises `ValueError` for what `features` refuses.
+
+    >>> import chalumeau
+    >>> two = [chalumeau.Note(0.1, 0.4, "C4"), chalumeau.Note(0.6, 0.4, "D4")]
+    >>> [round(note["f0_hz"]) for note in chalumeau.find_notes(chalumeau.render(two))]
+    [262, 294]
+    """
+    return _native.find_notes(_mono(samples), number("rate", rate))
+
+
+def _mono(samples: npt.ArrayLike) -> npt.NDArray[np.float32]:
     kind = np.asarray(samples).dtype.kind
     if kind in "iub" and np.size(samples):
         raise ValueError("samples are whole numbers, and full scale is 1.0; of 16 bits, divide them by 32768")
@@ -258,4 +278,4 @@ def features(samples: npt.ArrayLike, rate: float = 48_000, *, near: float | None
         raise ValueError("samples hold NaN or infinity, which has no pitch or level; measure a part without them")
     if array.ndim != 1:
         raise ValueError(f"samples must have one dimension, got the shape {array.shape}; take one channel")
-    return _native.features(array, number("rate", rate), None if near is None else number("near", near))
+    return array
