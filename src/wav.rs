@@ -3,6 +3,7 @@
 
 use hound::{SampleFormat, WavSpec, WavWriter};
 use std::io::{BufWriter, Seek, Write};
+use std::ops::Range;
 use std::path::Path;
 
 /// How a sample is stored.
@@ -169,14 +170,17 @@ pub struct Recording {
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum Unreadable {
-    /// It is missing, damaged, or of another format.
+    /// It is damaged, or of another format.
     #[error(
-        "not a WAV file that can be read ({0}); another format has to be converted first, for example with ffmpeg -i FILE sound.wav"
+        "not a WAV file that can be read ({0}): it is damaged, cut short, or of another format, which has to be converted first, for example with ffmpeg -i FILE sound.wav"
     )]
     Format(hound::Error),
     /// The system reports an error.
     #[error("cannot be read: {0}")]
     Read(std::io::Error),
+    /// Nothing is played that slowly.
+    #[error("the file has a sample rate of {0} Hz; from 1000 Hz on it can be measured")]
+    Rate(u32),
     /// There is no such channel.
     #[error("the file has {has} channel{}, and channel {wanted} is asked for", if *has == 1 { "" } else { "s" })]
     Channel {
@@ -195,6 +199,12 @@ pub enum Unreadable {
         /// Asked for, s.
         to_s: f64,
     },
+    /// A sample is NaN or infinite.
+    #[error("the sample at {at_s:.3} s is no number; measure a part without it")]
+    NotANumber {
+        /// Where, s.
+        at_s: f64,
+    },
 }
 
 impl From<hound::Error> for Unreadable {
@@ -207,36 +217,67 @@ impl From<hound::Error> for Unreadable {
     }
 }
 
-/// Reads one channel (counted from 1) of a file of any integer depth or 32 bit floats, or the mean of all, from one time to
-/// another, s.
+/// Reads one channel (counted from 1), or the mean of all, from one time to another, s: integers of 8, 16, 24 or 32 bits, or floats
+/// of 32.
 pub fn read(path: &Path, channel: Option<u16>, from_s: f64, to_s: f64) -> Result<Recording, Unreadable> {
     let mut reader = hound::WavReader::open(path)?;
     let WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format } = reader.spec();
+    if rate < 1_000 {
+        return Err(Unreadable::Rate(rate));
+    }
     if let Some(wanted) = channel.filter(|channel| !(1..=channels).contains(channel)) {
         return Err(Unreadable::Channel { wanted, has: channels });
     }
     let (length, per_s) = (reader.duration(), f64::from(rate));
-    let at = |s: f64| (s * per_s).round().clamp(0.0, f64::from(length)) as u32;
-    let (from, to) = (at(from_s), at(to_s));
-    if from >= to {
-        return Err(Unreadable::Nothing { seconds: f64::from(length) / per_s, from_s, to_s });
+    let seconds = f64::from(length) / per_s;
+    let at = |s: f64| (s * per_s).round().clamp(0.0, f64::from(length)) as usize;
+    let frames = at(from_s)..at(to_s);
+    if frames.is_empty() {
+        return Err(Unreadable::Nothing { seconds, from_s, to_s });
     }
-    reader.seek(from).map_err(Unreadable::Read)?;
-    let count = (to - from) as usize * usize::from(channels);
-    let all: Vec<f32> = match sample_format {
-        SampleFormat::Float => reader.samples::<f32>().take(count).collect::<Result<_, _>>()?,
+    let samples = match sample_format {
+        SampleFormat::Float => one_channel(
+            reader.samples::<f32>().map(|sample| sample.map(f64::from)),
+            &frames,
+            channels,
+            channel,
+        ),
         SampleFormat::Int => {
             let full = f64::from(bits_per_sample.saturating_sub(1)).exp2();
-            let sample = |sample: Result<i32, _>| sample.map(|sample| (f64::from(sample) / full) as f32);
-            reader.samples::<i32>().take(count).map(sample).collect::<Result<_, _>>()?
+            let scaled = reader.samples::<i32>().map(|sample| sample.map(|sample| f64::from(sample) / full));
+            one_channel(scaled, &frames, channels, channel)
         }
-    };
-    let frames = all.chunks_exact(usize::from(channels));
-    let samples = frames.map(|frame| match channel {
-        Some(channel) => f64::from(frame[usize::from(channel) - 1]),
-        None => frame.iter().map(|&sample| f64::from(sample)).sum::<f64>() / f64::from(channels),
-    });
-    Ok(Recording { rate, channels, seconds: f64::from(length) / per_s, samples: samples.collect() })
+    }?;
+    match samples.iter().position(|sample| !sample.is_finite()) {
+        Some(at) => Err(Unreadable::NotANumber { at_s: (frames.start + at) as f64 / per_s }),
+        None => Ok(Recording { rate, channels, seconds, samples }),
+    }
+}
+
+/// A channel, or the mean of all, of these frames. What lies before them is read and dropped: the reader seeks wrongly where samples
+/// have more bytes than bits.
+fn one_channel(
+    samples: impl Iterator<Item = hound::Result<f64>>,
+    frames: &Range<usize>,
+    channels: u16,
+    channel: Option<u16>,
+) -> hound::Result<Vec<f64>> {
+    let of_a_frame = usize::from(channels);
+    let mut frame_values = Vec::with_capacity(frames.len());
+    let mut samples = samples.skip(frames.start * of_a_frame);
+    for _ in frames.clone() {
+        let mut value = 0.0;
+        for (number, sample) in (1..=channels).zip(samples.by_ref()) {
+            let sample = sample?;
+            match channel {
+                None => value += sample / f64::from(channels),
+                Some(channel) if channel == number => value = sample,
+                Some(_) => {}
+            }
+        }
+        frame_values.push(value);
+    }
+    Ok(frame_values)
 }
 
 /// Scales -1..=1 to integer full scale, rounds to nearest and clips.
@@ -361,6 +402,20 @@ mod tests {
                 );
             }
         }
+        // 24 bits in four bytes, mono, extensible: 0.5, then -0.25.
+        let mut bytes = b"RIFF\x9c\0\0\0WAVEfmt \x28\0\0\0\xfe\xff\x01\0\x80\xbb\0\0\0\xee\x02\0\x04\0\x20\0\x16\0\x18\0\x04\0\0\0".to_vec();
+        bytes.extend(b"\x01\0\0\0\0\0\x10\0\x80\0\0\xaa\0\x38\x9b\x71data\x60\0\0\0");
+        let sample = |n: i32| if n < 12 { 0x40_0000 } else { -0x20_0000_i32 };
+        bytes.extend((0..24).flat_map(|n| sample(n).to_le_bytes()));
+        std::fs::write(&path, bytes).unwrap();
+        let part = read(&path, None, 10.0 / 48_000.0, 1.0).unwrap();
+        assert_eq!(part.samples, [[0.5; 2].as_slice(), &[-0.25; 12]].concat());
+        let mut file = NewFile::create(&path, true).unwrap();
+        let mut wav = WavFile::new(&mut file, 48_000, Depth::Float32, 1, 3).unwrap();
+        wav.write(&[&[0.0, f32::NAN, 0.0]]).unwrap();
+        wav.finish().unwrap();
+        file.keep().unwrap();
+        assert!(matches!(read(&path, None, 0.0, 1.0), Err(Unreadable::NotANumber { .. })));
         std::fs::write(&path, "ID3 and not a WAV file at all, as one sees").unwrap();
         assert!(matches!(read(&path, None, 0.0, 1.0), Err(Unreadable::Format(_))));
         assert!(matches!(read(&directory.path().join("no.wav"), None, 0.0, 1.0), Err(Unreadable::Read(_))));

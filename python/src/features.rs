@@ -2,8 +2,8 @@
 
 use crate::mistakes::wrong;
 use chalumeau_core::analysis::onset::attack_s;
-use chalumeau_core::analysis::{pitch, recording};
 use chalumeau_core::analysis::spectrum::{centroid_hz, harmonic_levels_db, rms_dbfs, steady_segment};
+use chalumeau_core::analysis::{pitch, recording};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -56,7 +56,7 @@ pub fn find_notes<'py>(
         dict.set_item("end_s", note.end_s)?;
         dict.set_item("f0_hz", note.f0_hz)?;
         dict.set_item("level_dbfs", note.level_dbfs)?;
-        dict.set_item("attack_s", note.attack_s)?;
+        dict.set_item("t90_s", note.t90_s)?;
         dict.set_item("centroid_hz", note.centroid_hz)?;
         dict.set_item("harmonics_db", note.levels_db)?;
         Ok(dict)

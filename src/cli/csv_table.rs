@@ -11,12 +11,15 @@ use std::io::{BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 
 /// What files of other endings are.
-const OTHERS: [(&str, &str); 8] = [
+const OTHERS: [(&str, &str); 11] = [
     ("png", "a picture"),
+    ("jpg", "a picture"),
+    ("pdf", "a document"),
     ("svg", "a picture"),
     ("gif", "a picture"),
     ("wav", "a sound"),
     ("mid", "a MIDI file"),
+    ("midi", "a MIDI file"),
     ("toml", "an instrument or a plan"),
     ("json", "the data of a figure"),
     ("html", "a page"),
@@ -48,10 +51,15 @@ impl TableArgs {
     /// command reads.
     pub fn check_files(&self, read: &[MaybeFile], others: &[MaybeFile]) -> Result<(), Failure> {
         files::check(files::READ, read, &[&[self.path()], others].concat(), self.force)?;
+        self.check_name()
+    }
+
+    /// Refuses a name by which the table would be taken for something else.
+    fn check_name(&self) -> Result<(), Failure> {
         let ending = self.csv.extension().unwrap_or_default().to_ascii_lowercase();
         match OTHERS.iter().find(|(other, _)| ending == *other) {
             Some((_, what)) => Err(Failure::Usage(format!(
-                "--csv {}: a file of this name would be {what}; a table is called .csv, .tsv or .txt",
+                "--csv {}: a file of this name would be {what}; a table is called .csv or .txt",
                 self.csv.display()
             ))),
             None => Ok(()),
@@ -64,6 +72,7 @@ impl TableArgs {
     }
 
     pub fn open(&self, header: &str) -> Result<CsvTable, Failure> {
+        self.check_name()?;
         CsvTable::open(&self.csv, self.force, header)
     }
 }

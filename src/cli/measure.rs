@@ -11,7 +11,7 @@ use chalumeau_core::units::{SoundingNote, cents};
 use clap::Args;
 use std::path::PathBuf;
 
-/// The longest part that is measured, s: ten minutes need 1 GB.
+/// The longest part that is measured, s: ten minutes need 1 GB at 48 kHz, and half a minute.
 const LONGEST_S: f64 = 600.0;
 
 const EXAMPLES: &str = "\
@@ -24,9 +24,12 @@ Examples:
 ///
 /// For any WAV file with one voice: a clarinet before a microphone, or what `chalumeau render` wrote. Each line of the table is a
 /// note as it *sounds*; a B flat clarinet reads it two semitones higher. Cents are against equal temperament at --a4. The level is that of the
-/// steady part, dB re full scale. The attack is the time from the beginning to 90 % of that level, short in a slur. The centroid is
-/// the power-weighted mean frequency, noise included. h1_db to h12_db are the harmonics, dB re the strongest. Chords, and voices with
-/// accompaniment, give wrong notes or none.
+/// steady part, dB re full scale; t90_s is the time from the beginning until 90 % of the steady level, short in a slur. The centroid is
+/// the power-weighted mean frequency, noise included. h1_db to h12_db are the harmonics, dB re the strongest. Of a long note the first
+/// four seconds are measured.
+///
+/// A note lasts some 0.05 s or more, lies between 50 and 2500 Hz, and is at most 45 dB softer than the loudest moment. Glides are no notes. A
+/// flutter tongue counts as tonguing. Chords, and voices with accompaniment, give wrong notes or none.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct MeasureCommand {
@@ -36,7 +39,7 @@ pub struct MeasureCommand {
     /// Measure from here on, s
     #[arg(long, value_name = "S", default_value = "0", value_parser = |s: &str| within(s, 0.0, 86_400.0))]
     from: f64,
-    /// Measure up to here, s, at most 600 after --from [default: the end]
+    /// Measure up to here, s [default: the end, or 600 s after --from, which is the most]
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 86_400.0))]
     to: Option<f64>,
     /// Measure one channel, from 1 on [default: the mean of all]
@@ -49,6 +52,10 @@ pub struct MeasureCommand {
     table: TableArgs,
     #[command(flatten)]
     plot: PlotArgs,
+}
+
+fn counted(notes: usize) -> String {
+    if notes == 1 { "1 note".to_owned() } else { format!("{notes} notes") }
 }
 
 impl MeasureCommand {
@@ -73,7 +80,7 @@ impl MeasureCommand {
         }
         let plot = self.plot.open(self.table.force())?;
         let harmonics: Vec<_> = (1..=HARMONICS).map(|n| format!("h{n}_db")).collect();
-        let columns = "start_s,end_s,sounding_midi,name,f_hz,cents,level_dbfs,attack_s,centroid_hz";
+        let columns = "start_s,end_s,sounding_midi,name,f_hz,cents,level_dbfs,t90_s,centroid_hz";
         let mut table = self.table.open(&format!("{columns},{}", harmonics.join(",")))?;
         let (notes, track) = recording::notes(&sound.samples, f64::from(sound.rate));
         let channel = match self.channel {
@@ -82,7 +89,7 @@ impl MeasureCommand {
             None => format!("mean of {} channels", sound.channels),
         };
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-        let remark = format!("{channel}, {} Hz, A4 = {} Hz; {} notes", sound.rate, self.a4, notes.len());
+        let remark = format!("{channel}, {} Hz, A4 = {} Hz; {}", sound.rate, self.a4, counted(notes.len()));
         table.comment(format_args!("{name}: {remark}, as they sound"))?;
         let mut names = Vec::new();
         for note in &notes {
@@ -98,16 +105,14 @@ impl MeasureCommand {
                 named(sounding),
                 note.f0_hz,
                 note.level_dbfs,
-                note.attack_s,
+                note.t90_s,
                 note.centroid_hz,
                 levels.collect::<Vec<_>>().join(",")
             ))?;
         }
         table.finish()?;
         if notes.is_empty() {
-            say!(
-                "note: no note was found: a note lasts 0.05 s or more, has a pitch between 50 and 2500 Hz, and sounds alone"
-            );
+            say!("note: no note was found; `chalumeau help measure` says what is one");
         }
         plot.draw(|| {
             chalumeau_figure::recording::figure(&name, &remark, &notes, &names, &track, self.a4, self.from)

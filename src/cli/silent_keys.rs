@@ -2,7 +2,7 @@
 
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::control::parts::Unplayed;
-use chalumeau_core::event::{Event, PartEvent, Timed};
+use chalumeau_core::event::{Event, PartEvent, Timed, To};
 use chalumeau_core::instrument::{Model, Reach};
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 use std::collections::BTreeSet;
@@ -24,23 +24,45 @@ pub fn silent_notes(
     silent_keys(&asked.collect::<Vec<_>>(), model, reach)
 }
 
-/// Says how many notes are not heard because another begins in the same moment: one player plays one note at a time, and of keys
-/// that are struck together the last.
+/// Says how many notes are never heard, because a later one of the same moment is held as long: one player plays one note at a time, the
+/// last key, and when it comes up the one below it.
 pub fn hidden_in_chords(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Option<String> {
-    let key = |timed: &Timed<PartEvent>| match timed.event.event {
-        Event::NoteOn { note, .. } => reach.fingering(note, model).map(|_| note),
-        _ => None,
-    };
-    let is_hidden = |at: usize| {
-        let Some(note) = key(&events[at]) else { return false };
-        let together = events[at + 1..].iter().take_while(|other| other.at == events[at].at);
-        let mut same_part = together.filter(|other| other.event.to == events[at].event.to);
-        same_part.any(|other| key(other).is_some_and(|other| other != note))
-    };
-    let count = (0..events.len()).filter(|&at| is_hidden(at)).count();
+    // Of each player the held keys, and which of them were heard.
+    let mut held: Vec<(To, Vec<(SoundingNote, bool)>)> = Vec::new();
+    let (mut count, mut now) = (0, 0);
+    for timed in events {
+        if timed.at > now {
+            held.iter_mut().filter_map(|(_, keys)| keys.last_mut()).for_each(|(_, heard)| *heard = true);
+            now = timed.at;
+        }
+        let to = timed.event.to;
+        let at = held.iter().position(|(other, _)| *other == to).unwrap_or_else(|| {
+            held.push((to, Vec::new()));
+            held.len() - 1
+        });
+        let keys = &mut held[at].1;
+        let mut let_go = |is_meant: &dyn Fn(SoundingNote) -> bool| {
+            count += keys.iter().filter(|&&(key, heard)| is_meant(key) && !heard).count();
+            keys.retain(|&(key, _)| !is_meant(key));
+        };
+        match timed.event.event {
+            Event::NoteOn { note, .. } if reach.fingering(note, model).is_some() => {
+                let_go(&|key| key == note);
+                keys.push((note, false));
+            }
+            Event::NoteOff { note } | Event::Choke { note } => let_go(&|key| key == note),
+            Event::Panic => let_go(&|_| true),
+            _ => {}
+        }
+    }
+    // The last of what is held to the end is heard, and perhaps nothing else.
+    count += held
+        .iter()
+        .map(|(_, keys)| keys.iter().rev().skip(1).filter(|(_, heard)| !heard).count())
+        .sum::<usize>();
     (count > 0).then(|| {
         format!(
-            "{} not heard: another begins in the same moment. A clarinet plays one note at a time, of a chord the last in the file",
+            "{} never heard: another begins in the same moment and lasts as long. A clarinet plays one note at a time, of a chord the last in the file",
             if count == 1 { "1 note is".to_owned() } else { format!("{count} notes are") }
         )
     })

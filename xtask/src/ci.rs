@@ -82,7 +82,7 @@ static STAGES: &[&[Step]] = &[
     })],
     &[step("tests and programs build", || programs().map(drop))],
     &[step("tests", tests::run)],
-    // What builds with cargo keeps cargo from others, which wait.
+    // Builds and checks in three folders: two at once do not wait for each other.
     &[
         step("bundle", || bundle::run(&[])),
         step("Python package", python_package),
@@ -100,7 +100,7 @@ static STAGES: &[&[Step]] = &[
         clocked("MIDI over JACK", jack::test),
         #[cfg(target_os = "linux")]
         clocked("VST3's window in Ardour", ardour::test),
-        step("web", web::test),
+        clocked("web", web::test),
         step("Python examples", python_examples),
         step("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
         step("firmware, host and ARM", firmware::all),

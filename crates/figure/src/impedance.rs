@@ -172,8 +172,7 @@ pub fn chart(instrument: &str, notes: Vec<String>, rows: &[NotePeaks]) -> Figure
     }
     for mode in 0..count {
         let points = rows.iter().filter_map(|row| Some((x(row), row.peaks.get(mode)?.f_hz)));
-        let points: Vec<_> = points.filter(|(_, hz)| hz.is_finite()).collect();
-        let is_named = !points.is_empty() && (count <= MOST_NAMED || mode == 0 || mode + 1 == count);
+        let is_named = count <= MOST_NAMED || mode == 0 || mode + 1 == count;
         let name = if is_named { format!("peak {}", mode + 1) } else { String::new() };
         places = places.with(Points::new(name, points).colour(Colour::of_family(mode, count)).size(3.5));
     }

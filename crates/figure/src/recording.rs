@@ -6,9 +6,9 @@ use chalumeau_core::analysis::pitch::TrackPoint;
 use chalumeau_core::analysis::recording::Note;
 use chalumeau_core::units::cents;
 
-/// Softer moments have no level worth drawing, dB re the loudest.
+/// Softer moments have no level worth drawing, dB re the loudest: 15 dB below the softest notes.
 const SOFT_DB: f64 = -60.0;
-/// A line breaks where the pitch jumps by more, cents.
+/// A line breaks where the pitch jumps by more, cents: half a semitone and a little.
 const JUMP_CENTS: f64 = 60.0;
 /// As many notes have harmonics of their own; of more, the mean is drawn.
 const MOST: usize = 6;
@@ -108,7 +108,7 @@ mod tests {
             end_s: start_s + 0.5,
             f0_hz,
             level_dbfs: -20.0,
-            attack_s: 0.05,
+            t90_s: 0.05,
             centroid_hz: 900.0,
             levels_db: vec![0.0, -30.0, -6.0],
         }

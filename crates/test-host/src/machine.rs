@@ -34,9 +34,9 @@ pub fn cargo() -> Command {
     command
 }
 
-/// A program that, if it is to, gives way to others that want a core, where the system has a word for it.
-pub fn giving_way(program: &Path, it_does: bool) -> Command {
-    if !(it_does && cfg!(unix)) {
+/// A program, run at the lowest priority if `gives_way`; on Windows it has that of any other.
+pub fn giving_way(program: &Path, gives_way: bool) -> Command {
+    if !(gives_way && cfg!(unix)) {
         return Command::new(program);
     }
     let mut command = Command::new("nice");

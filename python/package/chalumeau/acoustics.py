@@ -255,9 +255,9 @@ def find_notes(samples: npt.ArrayLike, rate: float = 48_000) -> list[dict[str, A
     """Finds the notes of a recording of one voice, as ``chalumeau measure`` does: mono samples of shape ``(samples,)``, full scale 1.0.
 
     Returns for each note, in their order, ``start_s``, ``end_s``, ``f0_hz`` (mean fundamental of the steady part), ``level_dbfs`` (its rms
-    level), ``attack_s`` (from the beginning to 90 % of that level, short in a slur), ``centroid_hz`` (power-weighted mean frequency)
-    and ``harmonics_db``: the levels of harmonics 1 to 12 over the strongest of them. A note lasts 50 ms or more and has a pitch between 50
-    and 2500 Hz. Chords give wrong notes or none. Raises `ValueError` for what `features` refuses.
+    level), ``t90_s`` (from the beginning until 90 % of the steady level, short in a slur), ``centroid_hz`` (power-weighted mean frequency)
+    and ``harmonics_db``: the levels of harmonics 1 to 12 over the strongest of them. A note lasts some 50 ms or more and has a pitch
+    between 50 and 2500 Hz. Chords give wrong notes or none. Raises `ValueError` for what `features` refuses.
 
     >>> import chalumeau
     >>> two = [chalumeau.Note(0.1, 0.4, "C4"), chalumeau.Note(0.6, 0.4, "D4")]

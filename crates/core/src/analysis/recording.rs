@@ -5,53 +5,57 @@
 
 use crate::analysis::pitch::{TrackPoint, pitch_track, refine_hz};
 use crate::analysis::spectrum::{HARMONICS, centroid_hz, levels_of_harmonics_db, moving_rms, rms_dbfs};
-use crate::analysis::{is_hz, onset, upper_median};
+use crate::analysis::{is_hz, onset, upper_median, without_mean};
 use crate::units::cents;
 use std::ops::Range;
 
-/// Distance between moments looked at, s.
+/// Distance between moments looked at, s: six in a window of the track.
 const HOP_S: f64 = 0.01;
-/// What is softer than the loudest moment by more is no note: -45 dB, under most rooms' noise relative to a mezzo-forte.
+/// A moment further below the loudest is no note: -45 dB, which is above the noise of most rooms beside a mezzo-forte (by judgement).
 const SILENT: f64 = 0.0056;
-/// Less than full scale by more is no note in any file: -80 dB.
+/// A moment below this is no note in any file: -80 dB re full scale.
 const QUIET: f64 = 1e-4;
-/// A moment further from a note's mean is of another note, cents: more than a wide vibrato, less than a semitone.
-const OTHER_CENTS: f64 = 70.0;
-/// Shorter sounds are no notes, s.
-const SHORTEST_S: f64 = 0.05;
-/// Moments without pitch that a note survives, s.
-const GAP_S: f64 = 0.03;
+/// A moment further from a note's mean is of another note, cents: a vibrato reaches 40 to each side, a semitone is 100.
+const APART_CENTS: f64 = 70.0;
+/// Fewer moments are no note.
+const FEWEST: usize = 5;
+/// As many moments without pitch, or of another, do not end a note.
+const GAP: usize = 3;
+/// A sound of fewer moments, an octave or a twelfth below its neighbour, is that neighbour, whose period is also found twice and three
+/// times as long while another note dies away: a window of the track and half as much.
+const DOUBTFUL: usize = 9;
 /// Window of the envelope in which the tongue is looked for, s: two periods of 100 Hz.
 const ENVELOPE_S: f64 = 0.02;
-/// How far before and after a dip the level must be back, s.
+/// Distance between its values, s.
+const STEP_S: f64 = 0.001;
+/// How far before and after a dip the level must be back, s: that of quick tonguing (by judgement).
 const AROUND_S: f64 = 0.15;
-/// A dip below this share of the level on both sides is the tongue's: -8 dB.
+/// A dip below this share of the level on both sides is the tongue's: -8 dB, deeper than a vibrato's (by judgement).
 const DIP: f64 = 0.4;
-/// A note begins and ends at this share of its steady level.
+/// A note begins and ends at this share of its steady level, as in [`onset::attack_s`]; over noise, at twice the level beside it and at
+/// most at half of its own.
 const EDGE: f64 = 0.1;
-/// How far from its first and last pitch that may be, s: half a window of the track and what a hall adds at most.
-const EDGE_S: (f64, f64) = (0.06, 0.1);
-/// In a shorter sound, an octave or a twelfth below its neighbour is that neighbour, whose period is also found twice and three
-/// times as long while another note dies away, s: a window of the track and half as much.
-const DOUBTFUL_S: f64 = 0.09;
+/// How far from its first and last moment that may be, s: half a window of the track and a hop, and what a room adds at most (by
+/// judgement).
+const EDGE_S: (f64, f64) = (0.05, 0.1);
 /// What is cut from both ends before a note is measured: this share of it, at most so much, s.
 const MARGIN: (f64, f64) = (0.25, 0.1);
 /// Later parts of a long note are not measured, s; that of the [recipe](super::steady_note) for recordings.
 const LONGEST_S: f64 = 4.0;
 
-/// A note of a recording.
+/// A note of a recording. Of a note of more than four seconds, what is said of its steady part is of the first four.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
     /// Where it begins, s.
     pub start_s: f64,
     /// Where it ends, s.
     pub end_s: f64,
-    /// Mean fundamental of the steady part, Hz.
+    /// Mean fundamental of the steady part, Hz; of fewer than ten periods, the median of the track.
     pub f0_hz: f64,
     /// Level of the steady part, dB re full scale 1.0 (a full-scale sine reads -3.01).
     pub level_dbfs: f64,
-    /// Time from the beginning until 90 % of the steady level, s; short in a slur.
-    pub attack_s: f64,
+    /// Time from the beginning until 90 % of the steady level, s, as [`onset::t90_s`] has it; short in a slur.
+    pub t90_s: f64,
     /// Power-weighted mean frequency of the steady part, noise included, Hz.
     pub centroid_hz: f64,
     /// Levels of harmonics 1..=12 (fewer if 0.45 of the rate comes first), dB re the strongest of them.
@@ -77,24 +81,139 @@ pub fn notes(samples: &[f64], rate_hz: f64) -> (Vec<Note>, Vec<TrackPoint>) {
     if !is_hz(rate_hz) {
         return (Vec::new(), Vec::new());
     }
+    let samples = &without_mean(samples);
     let track = pitch_track(samples, rate_hz, HOP_S);
-    let envelope = moving_rms(samples, rate_hz, ENVELOPE_S);
+    let envelope = Envelope::new(samples, rate_hz);
     let loudest = track.iter().map(|point| point.rms).fold(0.0, f64::max);
     let floor = (SILENT * loudest).max(QUIET);
-    let pitched: Vec<_> =
-        track.iter().filter_map(|point| Some((point.t_s, point.hz.filter(|_| point.rms > floor)?))).collect();
-    let parts = tongued(without_longer_periods(parts(&pitched)), &envelope, rate_hz);
+    let pitched = track.iter().enumerate().filter(|(_, point)| point.rms > floor);
+    let pitched: Vec<_> = pitched.filter_map(|(at, point)| Some((at, point.hz?))).collect();
+    let timed = |run: Run| Part { from_s: track[run.from].t_s, to_s: track[run.to].t_s, hz: run.hz };
+    let parts = without_longer_periods(runs(&pitched)).into_iter().map(timed);
+    let parts = tongued(parts, &envelope);
     let mut notes: Vec<Note> = Vec::new();
     for (at, part) in parts.iter().enumerate() {
-        let after = notes.last().map_or(0.0, |note| note.end_s);
-        let before = parts.get(at + 1).map_or(f64::INFINITY, |next| 0.5 * (part.to_s + next.from_s));
-        let within = part.edges(&envelope, rate_hz, after, before);
+        let after_s = notes.last().map_or(0.0, |note| note.end_s);
+        let before_s = parts.get(at + 1).map_or(f64::INFINITY, |next| 0.5 * (part.to_s + next.from_s));
+        let within = part.edges(samples, rate_hz, &envelope, (after_s, before_s));
         notes.extend(measured(samples, rate_hz, within, part.hz));
     }
     (notes, track)
 }
 
-/// Moments of one pitch.
+/// Moments of one pitch, by their places in the track.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    from: usize,
+    /// The last one.
+    to: usize,
+    hz: f64,
+}
+
+impl Run {
+    /// The run of these moments; `None` for a glide.
+    fn of(moments: &[(usize, f64)]) -> Option<Self> {
+        let median = |moments: &[(usize, f64)]| upper_median(moments.iter().map(|(_, hz)| *hz));
+        let third = (moments.len() / 3).max(1);
+        let (first, last) =
+            (median(&moments[..third.min(moments.len())])?, median(&moments[moments.len() - third..])?);
+        let run = Self { from: moments.first()?.0, to: moments.last()?.0, hz: median(moments)? };
+        is_near(first, last).then_some(run)
+    }
+
+    fn moments(&self) -> usize {
+        self.to - self.from + 1
+    }
+
+    /// Whether nothing long is between this run and a later one.
+    fn touches(&self, next: &Self) -> bool {
+        next.from - self.to <= GAP + 1
+    }
+}
+
+/// Runs of one pitch that last.
+fn runs(pitched: &[(usize, f64)]) -> Vec<Run> {
+    let mut found: Vec<Run> = Vec::new();
+    let mut close = |moments: &[(usize, f64)]| {
+        let Some(run) = Run::of(moments) else { return };
+        match found.last_mut() {
+            // What lies between two runs of one note did not last.
+            Some(before) if before.touches(&run) && is_near(run.hz, before.hz) => before.to = run.to,
+            _ if run.moments() >= FEWEST => found.push(run),
+            _ => {}
+        }
+    };
+    let (mut first, mut mean) = (0, 0.0);
+    for (now, &(at, hz)) in pitched.iter().enumerate() {
+        let goes_on = now > first && at - pitched[now - 1].0 <= GAP + 1 && is_near(hz, mean);
+        if !goes_on {
+            close(&pitched[first..now]);
+            (first, mean) = (now, hz);
+        }
+        mean += (hz - mean) / (now - first + 1) as f64;
+    }
+    close(&pitched[first..]);
+    found
+}
+
+/// The runs without those that are a longer period of a neighbour.
+fn without_longer_periods(mut runs: Vec<Run>) -> Vec<Run> {
+    let mut at = 0;
+    while let Some(&run) = runs.get(at) {
+        let is_of = |hz: f64| [2.0, 3.0].iter().any(|times| is_near(times * run.hz, hz));
+        let is_doubtful = run.moments() < DOUBTFUL;
+        let next = runs.get(at + 1).copied();
+        let before = at.checked_sub(1).map(|at| runs[at]);
+        if is_doubtful && next.is_some_and(|next| is_of(next.hz) && run.touches(&next)) {
+            runs[at + 1].from = run.from;
+        } else if is_doubtful && before.is_some_and(|before| is_of(before.hz) && before.touches(&run)) {
+            runs[at - 1].to = run.to;
+        } else {
+            at += 1;
+            continue;
+        }
+        runs.remove(at);
+    }
+    runs
+}
+
+fn is_near(hz: f64, other_hz: f64) -> bool {
+    cents(hz, other_hz).abs() <= APART_CENTS
+}
+
+/// Values that follow each other this fast, from the time 0 on.
+struct Envelope {
+    values: Vec<f64>,
+    per_s: f64,
+}
+
+impl Envelope {
+    fn new(samples: &[f64], rate_hz: f64) -> Self {
+        let every = ((STEP_S * rate_hz) as usize).max(1);
+        let values = moving_rms(samples, rate_hz, ENVELOPE_S).into_iter().step_by(every);
+        Self { values: values.collect(), per_s: rate_hz / every as f64 }
+    }
+
+    fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = f64> + '_ {
+        self.values[seen(self.values.len(), self.per_s, from_s, to_s)].iter().copied()
+    }
+
+    fn lowest(&self, from_s: f64, to_s: f64) -> f64 {
+        self.between(from_s, to_s).fold(f64::INFINITY, f64::min)
+    }
+
+    fn highest(&self, from_s: f64, to_s: f64) -> f64 {
+        self.between(from_s, to_s).fold(0.0, f64::max)
+    }
+}
+
+/// Places of what lies between two times, s.
+fn seen(len: usize, per_s: f64, from_s: f64, to_s: f64) -> Range<usize> {
+    let at = |s: f64| ((s.max(0.0) * per_s).round() as usize).min(len);
+    at(from_s)..at(to_s).max(at(from_s))
+}
+
+/// A sound of one pitch, from its first to its last moment.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     from_s: f64,
@@ -102,78 +221,20 @@ struct Part {
     hz: f64,
 }
 
-/// Runs of one pitch that last.
-fn parts(pitched: &[(f64, f64)]) -> Vec<Part> {
-    let mut found: Vec<Part> = Vec::new();
-    let mut run: Vec<(f64, f64)> = Vec::new();
-    let mut mean = 0.0;
-    let close = |run: &mut Vec<(f64, f64)>, found: &mut Vec<Part>| {
-        let (Some(first), Some(last)) = (run.first(), run.last()) else { return };
-        let hz = upper_median(run.iter().map(|(_, hz)| *hz)).unwrap_or(first.1);
-        let part = Part { from_s: first.0, to_s: last.0, hz };
-        match found.last_mut() {
-            // What lies between two parts of one note did not last.
-            Some(before) if part.from_s - before.to_s <= GAP_S + HOP_S && is_near(part.hz, before.hz) => {
-                before.to_s = part.to_s;
-            }
-            _ if part.to_s - part.from_s + HOP_S >= SHORTEST_S => found.push(part),
-            _ => {}
-        }
-        run.clear();
-    };
-    for &(t_s, hz) in pitched {
-        let goes_on = run.last().is_some_and(|(last_s, _)| t_s - last_s <= GAP_S + HOP_S);
-        if !(goes_on && is_near(hz, mean)) {
-            close(&mut run, &mut found);
-            mean = hz;
-        }
-        run.push((t_s, hz));
-        mean += (hz - mean) / run.len() as f64;
-    }
-    close(&mut run, &mut found);
-    found
-}
-
-/// The parts without those that are a longer period of a neighbour.
-fn without_longer_periods(mut parts: Vec<Part>) -> Vec<Part> {
-    let mut at = 0;
-    while let Some(&part) = parts.get(at) {
-        let is_of = |hz: f64| [2.0, 3.0].iter().any(|times| is_near(times * part.hz, hz));
-        let touches = |gap_s: f64| gap_s <= GAP_S + HOP_S;
-        let doubtful = part.to_s - part.from_s + HOP_S < DOUBTFUL_S;
-        let next = parts.get(at + 1).copied();
-        let before = at.checked_sub(1).map(|at| parts[at]);
-        if doubtful && next.is_some_and(|next| is_of(next.hz) && touches(next.from_s - part.to_s)) {
-            parts[at + 1].from_s = part.from_s;
-        } else if doubtful && before.is_some_and(|last| is_of(last.hz) && touches(part.from_s - last.to_s)) {
-            parts[at - 1].to_s = part.to_s;
-        } else {
-            at += 1;
-            continue;
-        }
-        parts.remove(at);
-    }
-    parts
-}
-
-fn is_near(hz: f64, other_hz: f64) -> bool {
-    cents(hz, other_hz).abs() <= OTHER_CENTS
-}
-
 /// The parts, each divided where the tongue interrupts it.
-fn tongued(parts: Vec<Part>, envelope: &[f64], rate_hz: f64) -> Vec<Part> {
+fn tongued(parts: impl Iterator<Item = Part>, envelope: &Envelope) -> Vec<Part> {
+    let least_s = FEWEST as f64 * HOP_S;
     let mut divided = Vec::new();
     for mut part in parts {
-        let mut t_s = part.from_s + SHORTEST_S;
-        while t_s <= part.to_s - SHORTEST_S {
-            let dip = lowest(envelope, rate_hz, t_s - 0.5 * HOP_S, t_s + 0.5 * HOP_S);
-            let before = highest(envelope, rate_hz, (t_s - AROUND_S).max(part.from_s), t_s);
-            let after = highest(envelope, rate_hz, t_s, (t_s + AROUND_S).min(part.to_s));
-            let is_lowest = dip <= lowest(envelope, rate_hz, t_s - SHORTEST_S, t_s + SHORTEST_S);
-            if is_lowest && dip < DIP * before.min(after) {
+        let mut t_s = part.from_s + least_s;
+        while t_s <= part.to_s - least_s {
+            let dip = envelope.lowest(t_s - 0.5 * HOP_S, t_s + 0.5 * HOP_S);
+            let before = envelope.highest((t_s - AROUND_S).max(part.from_s), t_s);
+            let after = envelope.highest(t_s, (t_s + AROUND_S).min(part.to_s));
+            if dip < DIP * before.min(after) && dip <= envelope.lowest(t_s - least_s, t_s + least_s) {
                 divided.push(Part { to_s: t_s, ..part });
                 part.from_s = t_s;
-                t_s += SHORTEST_S;
+                t_s += least_s;
             } else {
                 t_s += HOP_S;
             }
@@ -183,31 +244,30 @@ fn tongued(parts: Vec<Part>, envelope: &[f64], rate_hz: f64) -> Vec<Part> {
     divided
 }
 
-fn seen(len: usize, rate_hz: f64, from_s: f64, to_s: f64) -> Range<usize> {
-    let at = |s: f64| ((s.max(0.0) * rate_hz).round() as usize).min(len);
-    at(from_s)..at(to_s)
-}
-
-fn lowest(envelope: &[f64], rate_hz: f64, from_s: f64, to_s: f64) -> f64 {
-    envelope[seen(envelope.len(), rate_hz, from_s, to_s)].iter().copied().fold(f64::INFINITY, f64::min)
-}
-
-fn highest(envelope: &[f64], rate_hz: f64, from_s: f64, to_s: f64) -> f64 {
-    envelope[seen(envelope.len(), rate_hz, from_s, to_s)].iter().copied().fold(0.0, f64::max)
-}
-
 impl Part {
-    /// Where the sound of this note begins and ends, s, between its neighbours.
-    fn edges(&self, envelope: &[f64], rate_hz: f64, after_s: f64, before_s: f64) -> (f64, f64) {
-        let inner = seen(envelope.len(), rate_hz, self.from_s, self.to_s);
-        let steady = upper_median(envelope[inner].iter().copied()).unwrap_or(0.0);
-        let loud = |value: &f64| *value >= EDGE * steady;
-        let head = seen(envelope.len(), rate_hz, (self.from_s - EDGE_S.0).max(after_s), self.to_s);
-        let tail =
-            seen(envelope.len(), rate_hz, self.from_s, (self.to_s + EDGE_S.1).min(before_s.max(self.to_s)));
-        let start = envelope[head.clone()].iter().position(loud).map_or(head.start, |n| head.start + n);
-        let end = envelope[tail.clone()].iter().rposition(loud).map_or(tail.end, |n| tail.start + n + 1);
-        (start as f64 / rate_hz, end as f64 / rate_hz)
+    /// Where the sound of this note begins and ends, s, between its neighbours: through windows of one period.
+    fn edges(
+        &self,
+        samples: &[f64],
+        rate_hz: f64,
+        envelope: &Envelope,
+        (after_s, before_s): (f64, f64),
+    ) -> (f64, f64) {
+        let steady = upper_median(envelope.between(self.from_s, self.to_s)).unwrap_or(0.0);
+        let (head_s, tail_s) = (self.from_s - EDGE_S.0, self.to_s + EDGE_S.1);
+        // What is heard of the note itself on its first or last moment is no noise.
+        let edge = |beside: f64| (EDGE * steady).max(2.0 * beside).min(0.5 * steady);
+        let first = edge(envelope.lowest(head_s, self.from_s));
+        let last = edge(envelope.lowest(self.to_s, tail_s));
+        let level = |from_s: f64, to_s: f64| {
+            let range = seen(samples.len(), rate_hz, from_s, to_s);
+            (range.start, moving_rms(&samples[range], rate_hz, 1.0 / self.hz))
+        };
+        let (from, levels) = level(head_s.max(after_s), self.from_s + EDGE_S.0);
+        let start = from + levels.iter().position(|level| *level >= first).unwrap_or(0);
+        let (from, levels) = level(self.to_s - EDGE_S.0, tail_s.min(before_s.max(self.to_s)));
+        let end = from + levels.iter().rposition(|level| *level >= last).map_or(levels.len(), |at| at + 1);
+        (start as f64 / rate_hz, end.max(start) as f64 / rate_hz)
     }
 }
 
@@ -223,7 +283,7 @@ fn measured(samples: &[f64], rate_hz: f64, (start_s, end_s): (f64, f64), near_hz
         end_s,
         f0_hz,
         level_dbfs: rms_dbfs(steady),
-        attack_s: onset::t90_s(spoken, rate_hz, 0.0)?,
+        t90_s: onset::t90_s(spoken, rate_hz, 0.0)?,
         centroid_hz: centroid_hz(steady, rate_hz)?,
         levels_db: levels_of_harmonics_db(steady, rate_hz, f0_hz, HARMONICS),
     })
@@ -301,19 +361,72 @@ mod tests {
     }
 
     #[test]
-    fn an_attack_takes_its_time() {
-        let swell = tone(300.0, RATE_HZ, 1.5, &CLARINET_DB).into_iter().enumerate();
-        let swell: Vec<f64> = swell.map(|(n, x)| x * (n as f64 / RATE_HZ / 0.3).min(1.0)).collect();
-        let (found, _) = notes(&swell, RATE_HZ);
-        assert_eq!(found.len(), 1);
-        // From 10 to 90 %.
-        assert!((found[0].attack_s - 0.24).abs() < 0.02, "{found:?}");
+    fn an_attack_takes_its_time_also_over_noise_and_an_offset() {
+        for (hz, ramp_s, within_s) in [(440.0, 0.01, 0.001), (440.0, 0.3, 0.01), (147.0, 0.1, 0.004)] {
+            for (offset, hiss) in [(0.0, 0.0), (0.005, 1e-4)] {
+                let samples = tone(hz, RATE_HZ, 1.5, &CLARINET_DB).into_iter().enumerate();
+                let at = |n: usize| n as f64 / RATE_HZ - 0.5;
+                let samples = samples.map(|(n, x)| 0.1 * x * (at(n) / ramp_s).clamp(0.0, 1.0) + offset);
+                let samples = mix(&samples.collect::<Vec<_>>(), &noise(hiss, 72_000));
+                let (found, _) = notes(&samples, RATE_HZ);
+                assert_eq!(found.len(), 1, "{found:#?}");
+                // From 10 to 90 %.
+                assert!((found[0].t90_s - 0.8 * ramp_s).abs() < within_s, "{hz} Hz, {ramp_s} s: {found:?}");
+                assert!(
+                    (found[0].start_s - 0.5 - 0.1 * ramp_s).abs() < within_s,
+                    "{hz} Hz, {ramp_s} s: {found:?}"
+                );
+            }
+        }
+        // 19 dB under the note.
+        let loud = mix(&[rests(0.5), tone(440.0, RATE_HZ, 1.0, &[-3.0])].concat(), &noise(0.056, 72_000));
+        let (found, _) = notes(&loud, RATE_HZ);
+        assert!(found.len() == 1 && (found[0].start_s - 0.5).abs() < 0.01, "{found:?}");
+    }
+
+    /// An octave in that time: what glides is no note, what is held before and after it is.
+    #[test]
+    fn a_glide_is_no_ladder() {
+        for glide_s in [0.3, 0.5, 1.0, 2.0] {
+            let sweep = |t: f64| glide_s / 2f64.ln() * 220.0 * (2f64.powf(t / glide_s) - 1.0);
+            let cycles = move |t: f64| match t {
+                ..0.5 => 220.0 * t,
+                t if t < 0.5 + glide_s => 110.0 + sweep(t - 0.5),
+                t => 110.0 + sweep(glide_s) + 440.0 * (t - 0.5 - glide_s),
+            };
+            let (found, _) = notes(&glide(cycles, RATE_HZ, glide_s + 1.0, &CLARINET_DB), RATE_HZ);
+            assert_eq!(found.len(), 2, "{glide_s} s: {found:#?}");
+        }
+    }
+
+    #[test]
+    fn quick_notes_are_all_found() {
+        for note_s in [0.08, 0.1] {
+            for steps in [[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], [0, 2, 0, 2, 0, 2, 0, 2, 0, 2]] {
+                let hz = |step: i32| 220.0 * 2f64.powf(f64::from(step) / 12.0);
+                let run: Vec<_> =
+                    steps.iter().map(|&step| tone(hz(step), RATE_HZ, note_s, &CLARINET_DB)).collect();
+                // Wherever it begins between two moments of the track.
+                for begins in 0..4 {
+                    let samples =
+                        [rests(0.1 + 0.0023 * f64::from(begins)), run.concat(), rests(0.2)].concat();
+                    let (found, _) = notes(&samples, RATE_HZ);
+                    assert_eq!(found.len(), 10, "{note_s} s, {steps:?}: {found:#?}");
+                }
+            }
+        }
     }
 
     #[test]
     fn what_is_no_note_is_none() {
-        for samples in [Vec::new(), rests(1.0), noise(0.1, 48_000), vec![0.5; 48_000], vec![f64::NAN; 48_000]]
-        {
+        for samples in [
+            Vec::new(),
+            rests(1.0),
+            noise(0.1, 48_000),
+            vec![0.5; 48_000],
+            vec![0.005; 48_000],
+            vec![f64::NAN; 48_000],
+        ] {
             assert_eq!(notes(&samples, RATE_HZ).0, []);
         }
         assert_eq!(notes(&tone(220.0, RATE_HZ, 1.0, &[0.0]), 0.0).0, []);
