@@ -4,14 +4,13 @@
 mod beside;
 mod tests;
 
-use std::panic::resume_unwind;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use std::{fs, iter, thread};
 
 use anyhow::{Context, Result, bail};
+use rayon::iter::{ParallelBridge, ParallelIterator};
 
 #[cfg(target_os = "linux")]
 use chalumeau_test_host::ardour;
@@ -52,64 +51,58 @@ const PACKAGE_PACKAGES: &[&str] = &[
 struct Step {
     name: &'static str,
     run: fn() -> Result<()>,
-    /// Follows a clock: in real time, or by what a display or a sound server says.
-    clocked: bool,
+    /// Keeps one core busy and follows no clock, so that another step may run at the same time.
+    beside: bool,
 }
 
-const fn step(name: &'static str, run: fn() -> Result<()>) -> Step {
-    Step { name, run, clocked: false }
+const fn alone(name: &'static str, run: fn() -> Result<()>) -> Step {
+    Step { name, run, beside: false }
 }
 
-const fn clocked(name: &'static str, run: fn() -> Result<()>) -> Step {
-    Step { name, run, clocked: true }
+const fn beside(name: &'static str, run: fn() -> Result<()>) -> Step {
+    Step { name, run, beside: true }
 }
 
-/// A stage begins when the one before it has ended. Its steps run at once, as [`lanes`] says: the clocked ones one after
-/// another, the others in this order, so the longest come first.
-///
 /// Two builds serve all steps: one debug build of everything (`programs`) and the bundle. Clippy and documentation only
 /// check. A step whose tool is missing fails: a gate that did not run is not green.
-static STAGES: &[&[Step]] = &[
-    &[step("system packages", packages)],
-    &[step("format", || cargo("fmt --all --check"))],
-    &[step("clippy", || cargo("clippy --workspace --all-features --all-targets -- -D warnings"))],
-    &[step("clippy, core alone", || cargo("clippy -p chalumeau-core --all-targets -- -D warnings"))],
-    &[step("clippy, command line alone", || {
+static STEPS: &[Step] = &[
+    alone("system packages", packages),
+    alone("format", || cargo("fmt --all --check")),
+    alone("clippy", || cargo("clippy --workspace --all-features --all-targets -- -D warnings")),
+    alone("clippy, core alone", || cargo("clippy -p chalumeau-core --all-targets -- -D warnings")),
+    alone("clippy, command line alone", || {
         cargo("clippy -p chalumeau --no-default-features --features cli --all-targets -- -D warnings")
-    })],
-    &[step("clippy, plugin alone", || {
+    }),
+    alone("clippy, plugin alone", || {
         cargo("clippy -p chalumeau --no-default-features --features plugin -- -D warnings")
-    })],
-    &[step("tests and programs build", || programs().map(drop))],
-    &[step("tests", tests::run)],
-    // Builds and checks in three folders: two at once do not wait for each other.
-    &[
-        step("bundle", || bundle::run(&[])),
-        step("Python package", python_package),
-        step("documentation", documentation),
-        step("examples in documentation", || cargo("test --workspace --all-features --doc")),
-    ],
-    &[
-        clocked("CLAP in clack-host", clap),
-        clocked("CLAP with allocation checks", clap_checked),
-        clocked("standalone", standalone),
-        // Elsewhere there is neither a JACK nor a display that a test could start.
-        #[cfg(target_os = "linux")]
-        clocked("window", window::test),
-        #[cfg(target_os = "linux")]
-        clocked("MIDI over JACK", jack::test),
-        #[cfg(target_os = "linux")]
-        clocked("VST3's window in Ardour", ardour::test),
-        clocked("web", web::test),
-        step("Python examples", python_examples),
-        step("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
-        step("firmware, host and ARM", firmware::all),
-        step("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3", "vst3_rules", "vst3_raw"]))),
-        step("validators", validate::installed),
-        step("VST3 in DawDreamer", dawdreamer),
-        step("VST3 in pedalboard", pedalboard),
-        step("generated files", generated),
-    ],
+    }),
+    alone("tests and programs build", || programs().map(drop)),
+    alone("tests", tests::run),
+    // The longest first.
+    beside("Python package", python_package),
+    beside("bundle", || bundle::run(&[])),
+    beside("web", web::test),
+    beside("Python examples", python_examples),
+    beside("firmware, host and ARM", firmware::all),
+    beside("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
+    beside("examples in documentation", || cargo("test --workspace --all-features --doc")),
+    beside("documentation", documentation),
+    beside("generated files", generated),
+    alone("CLAP in clack-host", clap),
+    alone("CLAP with allocation checks", clap_checked),
+    alone("standalone", standalone),
+    // Elsewhere there is neither a JACK nor a display that a test could start.
+    #[cfg(target_os = "linux")]
+    alone("window", window::test),
+    #[cfg(target_os = "linux")]
+    alone("MIDI over JACK", jack::test),
+    #[cfg(target_os = "linux")]
+    alone("VST3's window in Ardour", ardour::test),
+    // After all that builds: these load the bundle.
+    beside("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3", "vst3_rules", "vst3_raw"]))),
+    beside("validators", validate::installed),
+    beside("VST3 in DawDreamer", dawdreamer),
+    beside("VST3 in pedalboard", pedalboard),
 ];
 
 /// Before the whole name of a step, which then runs in this process.
@@ -127,24 +120,23 @@ pub fn run(words: &[String]) -> Result<()> {
     if let [flag, name] = words
         && flag == EXACTLY
     {
-        let step = STAGES.iter().copied().flatten().find(|step| step.name == *name);
+        let step = STEPS.iter().find(|step| step.name == *name);
         return (step.with_context(|| format!("no step is called {name:?}"))?.run)();
     }
-    let chosen = |step: &&Step| words.is_empty() || words.iter().any(|word| step.name.contains(word));
-    let stages: Vec<Vec<_>> = STAGES.iter().map(|stage| stage.iter().filter(chosen).collect()).collect();
-    if stages.iter().all(Vec::is_empty) {
-        let names: Vec<_> = STAGES.iter().copied().flatten().map(|step| step.name).collect();
+    let chosen: Vec<_> = STEPS
+        .iter()
+        .filter(|step| words.is_empty() || words.iter().any(|word| step.name.contains(word)))
+        .collect();
+    if chosen.is_empty() {
+        let names: Vec<_> = STEPS.iter().map(|step| step.name).collect();
         bail!("no step is called {words:?}; the steps are: {}", names.join("; "));
     }
     let began = Instant::now();
     let mut report = Vec::new();
-    for steps in stages {
-        match steps.as_slice() {
+    for steps in chosen.chunk_by(|a, b| a.beside && b.beside) {
+        match steps {
             [step] => report.push(done(step)),
-            _ => {
-                let (clocked, others): (Vec<_>, Vec<_>) = steps.into_iter().partition(|step| step.clocked);
-                report.extend(lanes(&clocked, &others, |step| beside::run(step)));
-            }
+            _ => report.extend(at_once(steps, |step| beside::run(step))),
         }
     }
     println!();
@@ -169,24 +161,10 @@ fn done(step: &'static Step) -> Done {
     Done { step, passed: result.is_ok(), took }
 }
 
-/// What `work` says of each item, in their order: as many at once as there are cores, but only one of the clocked ones, and
-/// those first. The others should [give way](machine::giving_way) to it.
-fn lanes<I: Sync, T: Send>(clocked: &[I], others: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
-    let numbered = Mutex::new(clocked.iter().chain(others).enumerate().skip(clocked.len()));
-    let next = || numbered.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let lane = |first: &[I]| {
-        let first: Vec<_> = first.iter().enumerate().map(|(at, item)| (at, work(item))).collect();
-        first.into_iter().chain(iter::from_fn(next).map(|(at, item)| (at, work(item)))).collect::<Vec<_>>()
-    };
-    let cores = thread::available_parallelism().map_or(1, usize::from);
-    let mut done: Vec<_> = thread::scope(|scope| {
-        let beside: Vec<_> = (1..cores).map(|_| scope.spawn(|| lane(&[]))).collect();
-        let mut done = lane(clocked);
-        done.extend(
-            beside.into_iter().flat_map(|lane| lane.join().unwrap_or_else(|panic| resume_unwind(panic))),
-        );
-        done
-    });
+/// What `work` says of each item, in their order: as many at once as there are cores, the first first.
+fn at_once<I: Sync, T: Send>(items: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
+    // The bridge hands items out one by one; a slice would be parted in halves, which begin together.
+    let mut done: Vec<_> = items.iter().enumerate().par_bridge().map(|(at, item)| (at, work(item))).collect();
     done.sort_by_key(|(at, _)| *at);
     done.into_iter().map(|(_, done)| done).collect()
 }

@@ -34,16 +34,6 @@ pub fn cargo() -> Command {
     command
 }
 
-/// A program, run at the lowest priority if `gives_way`; on Windows it has that of any other.
-pub fn giving_way(program: &Path, gives_way: bool) -> Command {
-    if !(gives_way && cfg!(unix)) {
-        return Command::new(program);
-    }
-    let mut command = Command::new("nice");
-    command.args(["-n", "19"]).arg(program);
-    command
-}
-
 /// Runs a command to its end; anything but success is an error that names it.
 pub fn run(command: &mut Command) -> Result<()> {
     let name = described(command);

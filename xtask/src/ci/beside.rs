@@ -1,8 +1,8 @@
-//! Steps of one stage run beside each other, each in a process of its own; those that follow no clock give way. What a step
-//! says goes to a file in `target/ci` and is printed in one piece when it ends.
+//! Steps that keep one core busy and follow no clock run beside each other, each in a process of its own. What a step says
+//! goes to a file in `target/ci` and is printed in one piece when it ends.
 
 use std::fs::{self, File};
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
@@ -30,7 +30,7 @@ fn apart(step: &Step) -> Result<()> {
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let path = folder.join(format!("{}.log", step.name.replace(' ', "-")));
     let log = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
-    let mut command = machine::giving_way(&this, !step.clocked);
+    let mut command = Command::new(this);
     command.args(["ci", EXACTLY, step.name]).stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
     let status = command.status()?;
     print!("{}", String::from_utf8_lossy(&fs::read(&path)?));

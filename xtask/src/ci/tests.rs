@@ -1,17 +1,15 @@
-//! All tests that need no host: as many test programs at once as there are cores. Those that follow no clock have one thread,
-//! so that no core waits for another's last test, and what takes minutes to prepare is prepared once for all tests of a
-//! program.
+//! All tests that need no host: as many test programs at once as there are cores, each with one thread. Then no core waits
+//! for another's last test, and what takes minutes to prepare is prepared once for all tests of a program.
 
 use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Result, bail, ensure};
 
-use super::{lanes, spoken};
-use crate::machine;
+use super::{at_once, spoken};
 use crate::programs::{TestProgram, programs};
 
-/// Programs that follow a clock (ports, links, the simulated knob in real time): one at a time, and the others give way.
+/// Programs that follow a clock (ports, links, the simulated knob in real time) run while nothing else does.
 const BY_THE_CLOCK: &[&str] =
     &["device", "knob_command", "simulator", "misbehaving", "obedience", "chalumeau_knob"];
 /// Programs that take longest begin first; the others follow in the order of their names.
@@ -35,18 +33,15 @@ pub fn run() -> Result<()> {
     let (clock, mut others): (Vec<_>, Vec<_>) =
         all.into_iter().partition(|test| BY_THE_CLOCK.contains(&test.name.as_str()));
     others.sort_by_key(|test| LONG.iter().position(|name| *name == test.name).unwrap_or(LONG.len()));
-    let results = lanes(&clock, &others, |test| played(test, &mut command(test)));
+    let mut results: Vec<_> = clock.into_iter().map(|test| played(test, &mut command(test))).collect();
+    results.extend(at_once(&others, |test| played(test, command(test).arg("--test-threads=1"))));
     let failed: Vec<_> = results.into_iter().filter_map(|result| Some(result.err()?.to_string())).collect();
     ensure!(failed.is_empty(), "{} failed: {}", failed.len(), failed.join(", "));
     Ok(())
 }
 
 fn command(test: &TestProgram) -> Command {
-    let clocked = BY_THE_CLOCK.contains(&test.name.as_str());
-    let mut command = machine::giving_way(&test.path, !clocked);
-    if !clocked {
-        command.arg("--test-threads=1");
-    }
+    let mut command = Command::new(&test.path);
     // As cargo starts it.
     command.current_dir(&test.folder).env("CARGO_MANIFEST_DIR", &test.folder);
     command
