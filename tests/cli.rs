@@ -364,8 +364,8 @@ fn existing_files_are_kept_unless_forced() {
     let path = d.path().join("x.wav");
     fs::write(&path, "old").unwrap();
     refused(&d, "render --written 60 --seconds 0.1 --out x.wav", &["x.wav exists already", "--force"]);
-    refused(&d, "reed --table --csv x.wav", &["x.wav exists already"]);
     fs::write(d.path().join("p.csv"), "old").unwrap();
+    refused(&d, "reed --table --csv p.csv", &["p.csv exists already"]);
     refused(&d, "render --written 60 --seconds 0.1 --out y.wav --probe p.csv", &["p.csv exists already"]);
     assert_eq!(fs::read(&path).unwrap(), b"old");
     succeeds(d.path(), "render --written 60 --seconds 0.1 --out x.wav --force");
