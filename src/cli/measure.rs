@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, named, number};
 use crate::cli::plot_args::PlotArgs;
-use crate::cli::shared_args::within;
+use crate::cli::shared_args::{counted, within};
 use crate::wav;
 use chalumeau_core::analysis::recording::{self, Note};
 use chalumeau_core::analysis::spectrum::HARMONICS;
@@ -54,10 +54,6 @@ pub struct MeasureCommand {
     plot: PlotArgs,
 }
 
-fn counted(notes: usize) -> String {
-    if notes == 1 { "1 note".to_owned() } else { format!("{notes} notes") }
-}
-
 impl MeasureCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let path = &self.recording;
@@ -89,7 +85,8 @@ impl MeasureCommand {
             None => format!("mean of {} channels", sound.channels),
         };
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-        let remark = format!("{channel}, {} Hz, A4 = {} Hz; {}", sound.rate, self.a4, counted(notes.len()));
+        let remark =
+            format!("{channel}, {} Hz, A4 = {} Hz; {}", sound.rate, self.a4, counted(notes.len(), "note"));
         table.comment(format_args!("{name}: {remark}, as they sound"))?;
         let mut names = Vec::new();
         for note in &notes {

@@ -1,6 +1,7 @@
 //! What a user should know of notes that an instrument cannot play.
 
 use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::control::keys::Keys;
 use chalumeau_core::control::parts::Unplayed;
 use chalumeau_core::event::{Event, PartEvent, Timed, To};
 use chalumeau_core::instrument::{Model, Reach};
@@ -24,48 +25,71 @@ pub fn silent_notes(
     silent_keys(&asked.collect::<Vec<_>>(), model, reach)
 }
 
-/// Says how many notes are never heard, because a later one of the same moment is held as long: one player plays one note at a time, the
-/// last key, and when it comes up the one below it.
+/// Says how many notes are never heard, because a later one of the same moment is held as long.
 pub fn hidden_in_chords(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Option<String> {
-    // Of each player the held keys, and which of them were heard.
-    let mut held: Vec<(To, Vec<(SoundingNote, bool)>)> = Vec::new();
-    let (mut count, mut now) = (0, 0);
+    let mut hands: Vec<Hand> = Vec::new();
+    let (mut hidden, mut now) = (0, 0);
     for timed in events {
         if timed.at > now {
-            held.iter_mut().filter_map(|(_, keys)| keys.last_mut()).for_each(|(_, heard)| *heard = true);
+            hands.iter_mut().for_each(Hand::hear);
             now = timed.at;
         }
         let to = timed.event.to;
-        let at = held.iter().position(|(other, _)| *other == to).unwrap_or_else(|| {
-            held.push((to, Vec::new()));
-            held.len() - 1
-        });
-        let keys = &mut held[at].1;
-        let mut let_go = |is_meant: &dyn Fn(SoundingNote) -> bool| {
-            count += keys.iter().filter(|&&(key, heard)| is_meant(key) && !heard).count();
-            keys.retain(|&(key, _)| !is_meant(key));
-        };
-        match timed.event.event {
-            Event::NoteOn { note, .. } if reach.fingering(note, model).is_some() => {
-                let_go(&|key| key == note);
-                keys.push((note, false));
-            }
-            Event::NoteOff { note } | Event::Choke { note } => let_go(&|key| key == note),
-            Event::Panic => let_go(&|_| true),
-            _ => {}
+        let at = hands.iter().position(|hand| hand.to == to).unwrap_or(hands.len());
+        if at == hands.len() {
+            hands.push(Hand { to, keys: Keys::default(), unheard: Vec::new() });
         }
+        let hand = &mut hands[at];
+        hidden += match timed.event.event {
+            Event::NoteOn { note, .. } if reach.fingering(note, model).is_some() => hand.press(note),
+            Event::NoteOff { note } | Event::Choke { note } => hand.release(note),
+            Event::Panic => {
+                hand.keys = Keys::default();
+                std::mem::take(&mut hand.unheard).len()
+            }
+            _ => 0,
+        };
     }
-    // The last of what is held to the end is heard, and perhaps nothing else.
-    count += held
-        .iter()
-        .map(|(_, keys)| keys.iter().rev().skip(1).filter(|(_, heard)| !heard).count())
-        .sum::<usize>();
-    (count > 0).then(|| {
+    hands.iter_mut().for_each(Hand::hear);
+    hidden += hands.iter().map(|hand| hand.unheard.len()).sum::<usize>();
+    (hidden > 0).then(|| {
         format!(
             "{} never heard: another begins in the same moment and lasts as long. A clarinet plays one note at a time, of a chord the last in the file",
-            if count == 1 { "1 note is".to_owned() } else { format!("{count} notes are") }
+            if hidden == 1 { "1 note is".to_owned() } else { format!("{hidden} notes are") }
         )
     })
+}
+
+/// The keys that a player holds.
+struct Hand {
+    to: To,
+    keys: Keys,
+    /// Those that have not been heard yet.
+    unheard: Vec<SoundingNote>,
+}
+
+impl Hand {
+    /// Time passes.
+    fn hear(&mut self) {
+        let heard = self.keys.last();
+        self.unheard.retain(|&key| Some(key) != heard);
+    }
+
+    /// Returns how many notes end unheard.
+    fn press(&mut self, note: SoundingNote) -> usize {
+        let ended = self.release(note);
+        self.keys.press(note);
+        self.unheard.push(note);
+        ended
+    }
+
+    /// Likewise.
+    fn release(&mut self, note: SoundingNote) -> usize {
+        self.keys.release(note);
+        let before = self.unheard.len();
+        self.unheard.retain(|&key| key != note);
+        before - self.unheard.len()
+    }
 }
 
 /// Says which of these keys the instrument cannot play, which stay silent.

@@ -41,6 +41,7 @@ pub mod felt;
 pub mod impedance;
 pub mod palette;
 pub mod performance;
+mod pitch_line;
 pub mod realism;
 pub mod recording;
 pub mod reed;

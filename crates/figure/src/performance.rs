@@ -1,6 +1,7 @@
 //! The figure of a rendering: waveform, spectrogram, pitch over the score, breath, and the reed in close-up.
 
 use crate::palette::Colour;
+use crate::pitch_line;
 use crate::{Axis, ColourMap, Direction, Figure, Heat, Layer, Line, Mark, Panel, Polygon, SecondAxis};
 use chalumeau_core::analysis::overview::{Envelope, HIGHEST_HZ, Overview};
 use chalumeau_core::instrument::Probe;
@@ -10,8 +11,6 @@ use chalumeau_core::units::SoundingNote;
 /// Levels of the lightest and the darkest colour of the spectrogram, dB re a sine of full scale.
 const FLOOR_DB: f64 = -110.0;
 const CEILING_DB: f64 = -20.0;
-/// A pitch line breaks where it jumps by more than this: from note to note, cents.
-const JUMP_CENTS: f64 = 60.0;
 /// Quieter than this there is no pitch to draw: -80 dB re full scale.
 const QUIET: f64 = 1e-4;
 
@@ -127,7 +126,7 @@ pub fn spectrogram(overview: &Overview) -> Panel {
 
 /// What is heard over what is written.
 pub fn pitch(overview: &Overview, score: &[Note], a4_hz: f64) -> Panel {
-    let key = |hz: f64| 69.0 + 12.0 * (hz / a4_hz).log2();
+    let key = |hz: f64| pitch_line::key(hz, a4_hz);
     let keys = score.iter().map(|note| f64::from(note.note.0));
     let (low, high) = keys.fold((f64::MAX, f64::MIN), |(low, high), key| (low.min(key), high.max(key)));
     let (low, high) = if low > high { (60.0, 72.0) } else { (low, high) };
@@ -140,23 +139,12 @@ pub fn pitch(overview: &Overview, score: &[Note], a4_hz: f64) -> Panel {
         let corners = [(from, key - 0.5), (from, key + 0.5), (to, key + 0.5), (to, key - 0.5)];
         panel = panel.with(Polygon::filled("", corners, Colour::Sky, 0.35));
     }
-    let mut line: Vec<(f64, f64)> = Vec::new();
-    let mut last: Option<f64> = None;
-    for point in &overview.track {
+    let heard = overview.track.iter().map(|point| {
+        let here = point.hz.filter(|_| point.rms > QUIET).map(key);
         // A squeak far above the notes is left to the spectrogram.
-        let here = point
-            .hz
-            .filter(|_| point.rms > QUIET)
-            .map(key)
-            .filter(|key| (low - 1.5..high + 1.5).contains(key));
-        if let (Some(a), Some(b)) = (here, last)
-            && (a - b).abs() > JUMP_CENTS / 100.0
-        {
-            line.push((point.t_s, f64::NAN));
-        }
-        line.push((point.t_s, here.unwrap_or(f64::NAN)));
-        last = here;
-    }
+        (point.t_s, here.filter(|key| (low - 1.5..high + 1.5).contains(key)))
+    });
+    let line = pitch_line::points(heard);
     panel.with(Line::new("", line).colour(Colour::Vermilion).width(2.0))
 }
 

@@ -1,15 +1,13 @@
 //! The notes of a recording: pitch and level over time, and the harmonics of each note.
 
 use crate::palette::Colour;
+use crate::pitch_line;
 use crate::{Axis, Dash, Figure, Line, Panel, Points, Shape};
 use chalumeau_core::analysis::pitch::TrackPoint;
 use chalumeau_core::analysis::recording::Note;
-use chalumeau_core::units::cents;
 
 /// Softer moments have no level worth drawing, dB re the loudest: 15 dB below the softest notes.
 const SOFT_DB: f64 = -60.0;
-/// A line breaks where the pitch jumps by more, cents: half a semitone and a little.
-const JUMP_CENTS: f64 = 60.0;
 /// As many notes have harmonics of their own; of more, the mean is drawn.
 const MOST: usize = 6;
 
@@ -32,33 +30,23 @@ pub fn figure(
     a4_hz: f64,
     from_s: f64,
 ) -> Figure {
-    let midi = |hz: f64| 69.0 + cents(hz, a4_hz) / 100.0;
-    let loudest = track.iter().map(|point| point.rms).fold(1e-9, f64::max);
-    let level = |point: &TrackPoint| 20.0 * (point.rms / loudest).log10();
-    let mut played: Vec<(f64, f64)> = Vec::new();
-    for point in track {
-        let is_of_a_note = notes.iter().any(|note| (note.start_s..note.end_s).contains(&point.t_s));
-        let Some(hz) = point.hz.filter(|_| is_of_a_note) else {
-            played.push((from_s + point.t_s, f64::NAN));
-            continue;
-        };
-        let jumps = played.last().is_some_and(|(_, last)| 100.0 * (midi(hz) - last).abs() > JUMP_CENTS);
-        if jumps {
-            played.push((from_s + point.t_s, f64::NAN));
-        }
-        played.push((from_s + point.t_s, midi(hz)));
-    }
+    let key = |hz: f64| pitch_line::key(hz, a4_hz);
+    let is_of_a_note = |t_s: f64| notes.iter().any(|note| (note.start_s..note.end_s).contains(&t_s));
+    let played =
+        track.iter().map(|point| (from_s + point.t_s, point.hz.filter(|_| is_of_a_note(point.t_s)).map(key)));
+    let played = pitch_line::points(played);
     let held = notes.iter().flat_map(|note| {
-        let at = midi(note.f0_hz);
+        let at = key(note.f0_hz);
         [(from_s + note.start_s, at), (from_s + note.end_s, at), (from_s + note.end_s, f64::NAN)]
     });
     let pitch = Panel::new("Pitch", Axis::linear("time, s"), Axis::notes("sounding note"))
         .with(Line::new("mean of each note", held).colour(Colour::Sky).width(6.0))
         .with(Line::new("every 10 ms", played).colour(Colour::Ink).width(1.5));
+    let in_db = |rms: f64| 20.0 * rms.log10();
+    let loudest_db = in_db(track.iter().map(|point| point.rms).fold(0.0, f64::max));
     let levels = track.iter().map(|point| {
-        let level = level(point);
-        let full = level + 20.0 * loudest.log10();
-        (from_s + point.t_s, if level > SOFT_DB { full } else { f64::NAN })
+        let level = Some(in_db(point.rms)).filter(|level| *level > loudest_db + SOFT_DB);
+        (from_s + point.t_s, level.unwrap_or(f64::NAN))
     });
     let level = Panel::new("Level", Axis::linear("time, s"), Axis::linear("dB re full scale"))
         .with(Line::new("", levels).colour(Colour::Blue));

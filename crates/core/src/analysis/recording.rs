@@ -114,10 +114,9 @@ impl Run {
     /// The run of these moments; `None` for a glide.
     fn of(moments: &[(usize, f64)]) -> Option<Self> {
         let median = |moments: &[(usize, f64)]| upper_median(moments.iter().map(|(_, hz)| *hz));
-        let third = (moments.len() / 3).max(1);
-        let (first, last) =
-            (median(&moments[..third.min(moments.len())])?, median(&moments[moments.len() - third..])?);
         let run = Self { from: moments.first()?.0, to: moments.last()?.0, hz: median(moments)? };
+        let third = moments.len().div_ceil(3);
+        let (first, last) = (median(&moments[..third])?, median(&moments[moments.len() - third..])?);
         is_near(first, last).then_some(run)
     }
 
