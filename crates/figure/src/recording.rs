@@ -3,7 +3,7 @@
 use crate::palette::Colour;
 use crate::pitch_line;
 use crate::{Axis, Dash, Figure, Line, Panel, Points, Shape};
-use chalumeau_core::analysis::pitch::TrackPoint;
+use chalumeau_core::analysis::pitch::{TrackPoint, WINDOW_S};
 use chalumeau_core::analysis::recording::Note;
 
 /// Softer moments have no level worth drawing, dB re the loudest: 15 dB below the softest notes.
@@ -39,7 +39,10 @@ pub fn figure(
         let at = key(note.f0_hz);
         [(from_s + note.start_s, at), (from_s + note.end_s, at), (from_s + note.end_s, f64::NAN)]
     });
-    let pitch = Panel::new("Pitch", Axis::linear("time, s"), Axis::notes("sounding note"))
+    // Both panels over the same time, half a window beyond the last moment.
+    let end_s = track.last().map_or(WINDOW_S, |point| point.t_s + 0.5 * WINDOW_S);
+    let time = || Axis::linear("time, s").range(from_s, from_s + end_s);
+    let pitch = Panel::new("Pitch", time(), Axis::notes("sounding note"))
         .with(Line::new("mean of each note", held).colour(Colour::Sky).width(6.0))
         .with(Line::new("every 10 ms", played).colour(Colour::Ink).width(1.5));
     let in_db = |rms: f64| 20.0 * rms.log10();
@@ -48,7 +51,7 @@ pub fn figure(
         let level = Some(in_db(point.rms)).filter(|level| *level > loudest_db + SOFT_DB);
         (from_s + point.t_s, level.unwrap_or(f64::NAN))
     });
-    let level = Panel::new("Level", Axis::linear("time, s"), Axis::linear("dB re full scale"))
+    let level = Panel::new("Level", time(), Axis::linear("dB re full scale"))
         .with(Line::new("", levels).colour(Colour::Blue));
     Figure::new(title)
         .note(remark)
