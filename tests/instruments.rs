@@ -399,6 +399,7 @@ fn random_instrument(random: &mut Random) -> InstrumentFile {
         transposition: 0,
         reed_volume_m3: 1e-6,
         nominal_radius_m: REFERENCE_RADIUS_M,
+        extension_semitones: 0,
         bore,
         holes: Vec::new(),
         fingerings: Vec::new(),

@@ -311,7 +311,7 @@ fn a_reed_without_lip_damping_squeaks() {
         .flat_map(|note| [0.45, 0.6, 0.8].map(|gamma| HeldNote::new(&MODEL, fingering(note), gamma)))
         .map(|note| {
             let rule =
-                chalumeau_core::instrument::lip::embouchure(MODEL.notes_hz[note.fingering], MODEL.lowest_hz);
+                chalumeau_core::instrument::lip::embouchure(MODEL.notes_hz[note.fingering], MODEL.size_hz);
             HeldNote { damping: 0.3 / rule.damping, ..note }
         })
         .collect();

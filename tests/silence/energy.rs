@@ -69,7 +69,7 @@ fn any_makers_reed(random: &mut Random) -> PhysicalReed {
 fn any_reed(random: &mut Random, settings: &Settings, model: &Model, fingering: usize) -> MovingReed {
     let lip_of = if random.below(2) == 0 { fingering } else { random.below(model.notes_hz.len()) };
     let pitch = f64::from(settings.a4_hz) / model.a4_hz;
-    let lip = embouchure(pitch * model.notes_hz[lip_of], pitch * model.lowest_hz);
+    let lip = embouchure(pitch * model.notes_hz[lip_of], pitch * model.size_hz);
     let settings = match random.below(2) {
         0 => *settings,
         _ => settings.with_physical_reed(&any_makers_reed(random), &PhysicalReed::reference()),

@@ -29,6 +29,7 @@ pub mod fingering_finder;
 pub mod fit;
 pub mod instrument_file;
 pub mod lattice;
+mod low_c;
 pub mod moved_hole;
 pub mod pulled_joint;
 pub mod radiation;

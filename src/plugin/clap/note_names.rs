@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn keys_have_the_names_that_the_player_reads() {
         for (instrument, count, lowest) in
-            [(Bundled::BFlat, 46, (50, "E3")), (Bundled::A, 46, (49, "E3")), (Bundled::Bass, 46, (38, "E3"))]
+            [(Bundled::BFlat, 46, (50, "E3")), (Bundled::A, 46, (49, "E3")), (Bundled::Bass, 50, (34, "C3"))]
         {
             let all = |reach: Reach, speaks: fn(usize) -> bool| {
                 named(&instrument.file(), reach, &KeyPitches::default(), speaks)

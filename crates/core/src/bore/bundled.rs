@@ -1,6 +1,7 @@
 //! The instruments that come with the program, each a file in `data/`.
 
 use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::low_c;
 use crate::maths;
 use std::sync::OnceLock;
 
@@ -16,7 +17,7 @@ pub enum Bundled {
     EFlat,
     /// The clarinet in C.
     C,
-    /// The bass clarinet in B flat, an octave below.
+    /// The bass clarinet in B flat, an octave below, with a lower joint down to written C3.
     Bass,
 }
 
@@ -80,15 +81,20 @@ impl Bundled {
             Self::A => ("A clarinet", semitone(1.0), "2^(1/12)", 3),
             Self::EFlat => ("E flat clarinet", semitone(-5.0), "2^(-5/12)", -3),
             Self::C => ("C clarinet", semitone(-2.0), "2^(-2/12)", 0),
-            Self::Bass => ("B flat bass clarinet", 2.0, "2", 14),
+            Self::Bass => ("B flat bass clarinet to low C", 2.0, "2", 14),
+        };
+        let longer = if self == Self::Bass {
+            ", and a longer lower joint with four more pads, down to written C3"
+        } else {
+            ""
         };
         let source = format!(
-            "The built-in B flat clarinet (data/b_flat_clarinet.toml, with its sources), every length times {said}; not a \
+            "The built-in B flat clarinet (data/b_flat_clarinet.toml, with its sources), every length times {said}{longer}; not a \
              measured instrument."
         );
         let name = format!("{name}, Boehm system");
-        let file = Self::BFlat.file().scaled(factor);
-        Some(InstrumentFile { name, source, transposition, ..file }.to_toml())
+        let file = InstrumentFile { name, source, transposition, ..Self::BFlat.file().scaled(factor) };
+        Some(if self == Self::Bass { low_c::extended(file) } else { file }.to_toml())
     }
 
     /// The text of its file.
@@ -122,7 +128,8 @@ mod tests {
         let lengths = Bundled::ALL.map(|instrument| {
             assert_eq!(Bundled::named(instrument.id()), Some(instrument));
             let file = instrument.file();
-            assert_eq!((file.holes.len(), file.fingerings.len()), (24, 46), "{}", file.name);
+            let low = if instrument == Bundled::Bass { 4 } else { 0 };
+            assert_eq!((file.holes.len(), file.fingerings.len()), (24 + low, 46 + low), "{}", file.name);
             assert!(file.source.len() > 20, "{}: where it comes from", file.name);
             (file.transposition, file.length_m())
         });

@@ -341,11 +341,9 @@ impl Cells {
 /// The networks of all holes of a file; viscous resistance taken at 2.4 times the lowest note (350 Hz on the B flat
 /// clarinet).
 pub fn networks(file: &InstrumentFile, air: &Air, cells: &Cells) -> Vec<HoleNetwork> {
-    let lowest_hz = file.lowest_hz();
+    let size_hz = file.size_hz();
     file.holes
         .iter()
-        .map(|hole| {
-            HoleNetwork::new(hole, file.radius_at(hole.x_m), cells.chimney_split, 2.4 * lowest_hz, air)
-        })
+        .map(|hole| HoleNetwork::new(hole, file.radius_at(hole.x_m), cells.chimney_split, 2.4 * size_hz, air))
         .collect()
 }

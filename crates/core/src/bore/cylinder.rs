@@ -265,6 +265,7 @@ impl Cylinder {
             transposition: self.transposition,
             reed_volume_m3: self.reed_volume_m3,
             nominal_radius_m: self.radius_m,
+            extension_semitones: 0,
             bore: vec![BoreSegment {
                 part: "cylinder".to_owned(),
                 x_start_m: 0.0,

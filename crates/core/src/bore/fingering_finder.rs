@@ -126,8 +126,9 @@ const AROUND: (f64, f64) = (0.7, 1.25);
 /// What the resonances of an instrument are looked for in, Hz.
 fn range_hz(file: &InstrumentFile) -> (f64, f64) {
     let notes = file.fingerings.iter().map(|fingering| file.sounding(fingering.written).frequency_hz(440.0));
-    let highest_hz = notes.fold(0.0, f64::max);
-    (RANGE_HZ.0.min(AROUND.0 * file.lowest_hz()), RANGE_HZ.1.max(AROUND.1 * highest_hz))
+    let (lowest_hz, highest_hz) =
+        notes.fold((f64::INFINITY, 0.0), |(low, high), hz| (hz.min(low), hz.max(high)));
+    (RANGE_HZ.0.min(AROUND.0 * lowest_hz), RANGE_HZ.1.max(AROUND.1 * highest_hz))
 }
 
 impl FingeringFinder {

@@ -64,6 +64,8 @@ pub struct InstrumentFile {
     /// Radius of the bore that zeta, Zc and the size of the reed refer to, m: that of the cylindrical part, by default
     /// [`REFERENCE_RADIUS_M`]. Admittances inside are over that of a tube of this radius.
     pub nominal_radius_m: f64,
+    /// Semitones that a longer lower joint adds below the notes of an ordinary clarinet, 0..=12 (bass clarinet to low C: 4).
+    pub extension_semitones: u8,
     /// The main bore from the reed tip (x = 0) to the end of the bell; contiguous.
     pub bore: Vec<BoreSegment>,
     /// Tone holes, ordered from the reed to the bell, at most [`MAX_HOLES`].
@@ -164,6 +166,7 @@ impl InstrumentFile {
         if let Some(diameter_mm) = raw.nominal_diameter_mm {
             within(&place, &words.nominal, diameter_mm, &NOMINAL_DIAMETER)?;
         }
+        within(&place, &words.extension, raw.extension_semitones as f64, &EXTENSION)?;
         if raw.name.trim().is_empty() {
             return Err(word(&place, &Word::plain("name"), &raw.name, "the name of the instrument"));
         }
@@ -178,6 +181,7 @@ impl InstrumentFile {
             nominal_radius_m: raw
                 .nominal_diameter_mm
                 .map_or(REFERENCE_RADIUS_M, |diameter_mm| diameter_mm / 2e3),
+            extension_semitones: raw.extension_semitones as u8,
             bore: segments(raw.bore, words)?,
             holes: Vec::new(),
             fingerings: Vec::new(),
@@ -254,9 +258,15 @@ impl InstrumentFile {
         SoundingNote(nearest as u8)
     }
 
-    /// Equal-tempered frequency of the lowest note, A4 = 440 Hz.
-    pub fn lowest_hz(&self) -> f64 {
-        self.sounding(self.lowest()).frequency_hz(440.0)
+    /// The lowest note without the [extension](Self::extension_semitones), which tells how large the instrument is: a longer lower
+    /// joint changes neither its reed nor how a player blows the other notes.
+    pub fn lowest_unextended(&self) -> WrittenNote {
+        WrittenNote(self.lowest().0.saturating_add(self.extension_semitones))
+    }
+
+    /// Equal-tempered frequency of the [lowest note without the extension](Self::lowest_unextended), A4 = 440 Hz.
+    pub fn size_hz(&self) -> f64 {
+        self.sounding(self.lowest_unextended()).frequency_hz(440.0)
     }
 
     /// The lowest note of the chart; MIDI note 0 for an instrument made by hand without one.

@@ -434,6 +434,7 @@ mod tests {
             transposition: 0,
             reed_volume_m3: 0.0,
             nominal_radius_m: REFERENCE_RADIUS_M,
+            extension_semitones: 0,
             bore: vec![BoreSegment { part: String::new(), x_start_m, x_end_m, r_start_m, r_end_m }],
             holes: Vec::new(),
             fingerings: Vec::new(),

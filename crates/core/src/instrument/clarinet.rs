@@ -138,7 +138,7 @@ impl Clarinet {
 
     fn with_resampler(model: Arc<Model>, host_rate_hz: f64, number: u8, resampler: Resampler) -> Self {
         let person = Person::new(number);
-        let lip = embouchure(model.lowest_hz, model.lowest_hz);
+        let lip = embouchure(model.size_hz, model.size_hz);
         let (swept, rate) = (model.swept_s, model.coeffs.rate_hz);
         let reed = ReedCoeffs::new(
             MovingReed {
@@ -164,7 +164,7 @@ impl Clarinet {
             voice.reset();
         });
         let level = OutputLevel::new(model.file.nominal_radius_m, host_rate_hz);
-        let scope = Scope::new(rate, model.lowest_hz);
+        let scope = Scope::new(rate, model.size_hz);
         Self {
             model,
             player: Player::new(person),

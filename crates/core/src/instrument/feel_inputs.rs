@@ -12,7 +12,7 @@ use crate::reed::Lip;
 pub fn played_reed(file: &InstrumentFile, a4_hz: f64, settings: &Settings) -> PlayedReed {
     let settings = settings.clamped();
     let sounding_hz = |written| file.sounding(written).frequency_hz(a4_hz);
-    let lowest_hz = sounding_hz(file.lowest());
+    let lowest_hz = sounding_hz(file.lowest_unextended());
     let lips = file
         .fingerings
         .iter()

@@ -87,7 +87,7 @@ impl HeldNote {
 
     /// The reed under the lip of this note.
     pub fn reed(&self, model: &Model) -> ReedCoeffs {
-        let lip = embouchure(model.notes_hz[self.fingering], model.lowest_hz);
+        let lip = embouchure(model.notes_hz[self.fingering], model.size_hz);
         let damping = lip.damping * self.damping;
         ReedCoeffs::new(
             MovingReed {

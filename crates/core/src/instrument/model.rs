@@ -63,8 +63,9 @@ pub struct Model {
     pub scale: f64,
     /// Air that the coefficients hold for.
     pub air: Air,
-    /// Equal-tempered frequency of the lowest note at [`a4_hz`](Self::a4_hz), Hz.
-    pub lowest_hz: f64,
+    /// Equal-tempered frequency of the [lowest note without an extension](InstrumentFile::lowest_unextended) at
+    /// [`a4_hz`](Self::a4_hz), Hz: how large the instrument is.
+    pub size_hz: f64,
     /// Sounding frequency of each fingering of the file at [`a4_hz`](Self::a4_hz), Hz.
     pub notes_hz: Vec<f64>,
     /// Register of each fingering: 1 chalumeau and throat, 2 clarion, 3 altissimo.
@@ -132,7 +133,7 @@ impl Model {
         let larger = file.reed_volume_m3 / REFERENCE_VOLUME_M3;
         let swept_s = PhysicalReed::reference().equivalent_volume_m3(&air) / (section * air.c) * larger;
         Self {
-            lowest_hz: file.lowest_hz() * a4_hz / A4_HZ,
+            size_hz: file.size_hz() * a4_hz / A4_HZ,
             notes_hz,
             registers,
             susceptance_slopes,
@@ -179,7 +180,7 @@ impl Model {
 
     /// Place of a fingering's note over the lowest note, see [`PlayerModel::place`]. Real-time safe.
     pub fn place(&self, fingering: usize) -> f64 {
-        PlayerModel::place(self.notes_hz[fingering], self.lowest_hz)
+        PlayerModel::place(self.notes_hz[fingering], self.size_hz)
     }
 
     /// Rows of round-trip delay that move a fingering's note by `cents`, estimated from the note's quarter-wave length.

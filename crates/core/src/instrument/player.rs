@@ -422,7 +422,7 @@ impl Player {
             registers: (model.registers[from], model.registers[fingering]),
             place: model.place(fingering),
             note_hz: model.notes_hz[fingering],
-            over_lowest: model.notes_hz[fingering] / model.lowest_hz,
+            over_lowest: model.notes_hz[fingering] / model.size_hz,
         });
         match (slur, self.settings.breath_response) {
             (Some(slur), BreathResponse::Played) => {
@@ -614,7 +614,7 @@ impl Player {
         let drive = Drive { p_mouth, tongue, noise: f64::from(settings.noise), reed: posture.reed };
         if has_other_speed {
             // The clock's speed has changed, and with it the length of a tick.
-            let lags = Lags::new(&self.now, self.tick_s(model), model.lowest_hz);
+            let lags = Lags::new(&self.now, self.tick_s(model), model.size_hz);
             if let Some(posture) = &mut self.posture {
                 posture.lags = lags;
             }

@@ -112,7 +112,12 @@ impl Mechanism {
             holes.fold(0_u64, |bits, hole| bits | 1 << hole)
         };
         let at_rest = file.holes.iter().enumerate().filter(|(_, hole)| hole.kind != HoleKind::KeyClosed);
-        let held = |p: &Position| Held { closes: bits(&p.closes), opens: bits(&p.opens), effort: p.effort };
+        let held = |p: &Position| {
+            let own_hole = p.closes.split_whitespace().chain(p.opens.split_whitespace()).next();
+            let is_here = own_hole.is_none_or(|name| file.hole(name).is_some());
+            let bits = |names: &str| if is_here { bits(names) } else { 0 };
+            Held { is_here, closes: bits(&p.closes), opens: bits(&p.opens), effort: p.effort }
+        };
         OnInstrument {
             at_rest: at_rest.fold(0_u64, |bits, (hole, _)| bits | 1 << hole),
             rings: self.ring.iter().map(|ring| (bits(&ring.pad), bits(&ring.closed_with))).collect(),
@@ -137,6 +142,8 @@ impl Mechanism {
 
 /// What a finger does in a position, holes one bit each.
 struct Held {
+    /// Whether the instrument has this key: the first hole that the position names.
+    is_here: bool,
     closes: u64,
     opens: u64,
     effort: u8,
@@ -155,7 +162,7 @@ impl OnInstrument {
     /// Calls `found` with each combination of those positions that are `allowed`.
     fn each(&self, allowed: impl Fn(&Held) -> bool, mut found: impl FnMut(Grip)) {
         let allowed = |finger: &Vec<Held>| {
-            let positions = finger.iter().enumerate().filter(|(_, held)| allowed(held));
+            let positions = finger.iter().enumerate().filter(|(_, held)| held.is_here && allowed(held));
             positions.map(|(position, _)| position as u8).collect()
         };
         let allowed: Vec<Vec<u8>> = self.fingers.iter().map(allowed).collect();
@@ -168,7 +175,7 @@ impl OnInstrument {
             let (mut closed, mut opened, mut effort) = (0, 0, 0);
             for (finger, held) in self.fingers.iter().enumerate() {
                 positions[finger] = allowed[finger][wheels[finger]];
-                let Held { closes, opens, effort: needs } = held[usize::from(positions[finger])];
+                let Held { closes, opens, effort: needs, .. } = held[usize::from(positions[finger])];
                 (closed, opened, effort) = (closed | closes, opened | opens, effort + needs);
             }
             for &(pad, with) in &self.rings {

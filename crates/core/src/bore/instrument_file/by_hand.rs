@@ -80,6 +80,7 @@ impl InstrumentFile {
             transposition_semitones: i64::from(self.transposition),
             reed_volume_mm3: tidy(1e9 * self.reed_volume_m3),
             nominal_diameter_mm: Some(tidy(2e3 * self.nominal_radius_m)),
+            extension_semitones: i64::from(self.extension_semitones),
             bore: by_hand(self.bore.iter().map(|segment| RawSegment {
                 part: segment.part.clone(),
                 x_start_mm: tidy(1e3 * segment.x_start_m),

@@ -151,6 +151,7 @@ impl InstrumentFile {
                 .map_or(chart.transposition.unwrap_or(0), i64::from),
             reed_volume_mm3: details.reed_volume_mm3,
             nominal_diameter_mm: details.nominal_diameter_mm,
+            extension_semitones: 0,
             bore,
             hole,
             fingering: chart.notes,

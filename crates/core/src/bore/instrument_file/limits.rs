@@ -33,6 +33,7 @@ pub(super) const TRANSPOSITION: Range = range(-12.0, 36.0, NEVER, " semitones (B
 pub(super) const REED_VOLUME: Range =
     Range { or_zero: true, ..range(20.0, 20_000.0, (100.0, 10_000.0), " (clarinet: 1200 mm3)") };
 pub(super) const NOMINAL_DIAMETER: Range = range(1.0, 200.0, (4.0, 150.0), " (B flat clarinet: 14.9 mm)");
+pub(super) const EXTENSION: Range = range(0.0, 12.0, NEVER, " semitones (bass clarinet to low C: 4)");
 // 3 m is a little more than a contrabass clarinet.
 pub(super) const POSITION: Range = range(0.0, 3_000.0, (5.0, 3_000.0), "");
 // Nearer to the tip than 1 mm there is no bore to drill.

@@ -20,6 +20,7 @@ pub(super) struct RawFile {
     pub(super) transposition_semitones: i64,
     pub(super) reed_volume_mm3: f64,
     pub(super) nominal_diameter_mm: Option<f64>,
+    pub(super) extension_semitones: i64,
     pub(super) bore: Vec<Lined<RawSegment>>,
     pub(super) hole: Vec<Lined<RawHole>>,
     pub(super) fingering: Vec<Lined<RawFingering>>,
@@ -35,6 +36,7 @@ impl RawFile {
             transposition_semitones: file.transposition_semitones,
             reed_volume_mm3: file.reed_volume_mm3,
             nominal_diameter_mm: file.nominal_diameter_mm,
+            extension_semitones: file.extension_semitones,
             bore: lined(file.bore, text),
             hole: lined(file.hole, text),
             fingering: lined(file.fingering, text),
@@ -68,6 +70,8 @@ struct TomlFile {
     reed_volume_mm3: f64,
     #[serde(default)]
     nominal_diameter_mm: Option<f64>,
+    #[serde(default)]
+    extension_semitones: i64,
     bore: Vec<Spanned<RawSegment>>,
     #[serde(default)]
     hole: Vec<Spanned<RawHole>>,

@@ -17,6 +17,13 @@ impl InstrumentFile {
     pub fn to_toml(&self) -> String {
         // Writing to a `String` cannot fail.
         let mut out = String::new();
+        let extension = match self.extension_semitones {
+            0 => String::new(),
+            semitones => format!(
+                "# Semitones that a longer lower joint adds below the notes of an ordinary clarinet.\n\
+                 extension_semitones = {semitones}\n\n"
+            ),
+        };
         let title: String = self.name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
         let _ = write!(
             out,
@@ -29,6 +36,7 @@ impl InstrumentFile {
              reed_volume_mm3 = {}\n\n\
              # Bore that zeta and the size of the reed refer to.\n\
              nominal_diameter_mm = {}\n\n\
+             {}\
              # Straight cones, each starting where the one before ends. A jump in diameter between two of them is a step.\n\
              bore = [\n",
             quoted(&self.name),
@@ -36,6 +44,7 @@ impl InstrumentFile {
             self.transposition,
             number(self.reed_volume_m3, 1e9),
             number(self.nominal_radius_m, 2e3),
+            extension,
         );
         for segment in &self.bore {
             let _ = writeln!(

@@ -167,7 +167,7 @@ impl Posture {
     /// For what is fingered, with ticks of `tick_s` seconds.
     pub fn new(settings: &Settings, fingered: &Fingered, tick_s: f64, model: &Model) -> Self {
         let Fingered { fingering, alternate_cents, bend_cents, subtone, follows } = *fingered;
-        let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
+        let lip = embouchure(model.notes_hz[fingering], model.size_hz);
         let free = MovingReed {
             law: settings.reed_law(),
             zeta: f64::from(settings.zeta),
@@ -211,7 +211,7 @@ impl Posture {
             alternate_cents,
             fingering,
             response,
-            lags: Lags::new(settings, tick_s, model.lowest_hz),
+            lags: Lags::new(settings, tick_s, model.size_hz),
             free,
             subtone,
             follows,

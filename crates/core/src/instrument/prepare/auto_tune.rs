@@ -58,7 +58,8 @@ impl Accuracy {
 
 /// How much longer than a B flat clarinet an instrument takes to settle: in proportion to its size.
 pub(super) fn longer(model: &Model) -> f64 {
-    (LOWEST_HZ / model.lowest_hz).clamp(1.0, 4.0)
+    let lowest_hz = model.notes_hz.first().copied().unwrap_or(LOWEST_HZ);
+    (LOWEST_HZ / lowest_hz).clamp(1.0, 4.0)
 }
 
 /// From when to when the pitch of a held note is measured, s: near the threshold a note grows slowly.

@@ -140,12 +140,17 @@ fn describe(all: &mut Vec<u8>, file: &InstrumentFile) {
         transposition,
         reed_volume_m3,
         nominal_radius_m,
+        extension_semitones,
         bore,
         holes,
         fingerings,
     } = file;
     all.extend(transposition.to_le_bytes());
     append(all, &[*reed_volume_m3, *nominal_radius_m]);
+    // Without one, the hash is what it was before there were extensions: tables that users keep stay valid.
+    if *extension_semitones > 0 {
+        all.push(*extension_semitones);
+    }
     append(all, &[bore.len() as f64, holes.len() as f64, fingerings.len() as f64]);
     for BoreSegment { part: _, x_start_m, x_end_m, r_start_m, r_end_m } in bore {
         append(all, &[*x_start_m, *x_end_m, *r_start_m, *r_end_m]);
@@ -202,6 +207,7 @@ mod tests {
         assert!(changed(|file| file.transposition += 1));
         assert!(changed(|file| file.reed_volume_m3 *= 1.001));
         assert!(changed(|file| file.nominal_radius_m *= 1.001));
+        assert!(changed(|file| file.extension_semitones = 1));
         assert!(changed(|file| file.bore[0].r_end_m *= 1.001));
         assert!(changed(|file| file.holes[1].register = true));
         assert!(changed(|file| file.holes[1].chimney_m *= 1.001));
