@@ -51,7 +51,7 @@ impl Window {
     /// High enough that no column scrolls.
     fn tall(tab: Tab) -> Self {
         // The breath view has the longest column.
-        Self::new(tab, (1100.0, if tab == Tab::Breath { 2500.0 } else { 1500.0 }))
+        Self::new(tab, (1100.0, if tab == Tab::Breath { 2650.0 } else { 1500.0 }))
     }
 
     fn new(tab: Tab, size: (f32, f32)) -> Self {

@@ -64,6 +64,7 @@ impl BreathView {
 
     fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         let c = Colours::here(ui);
+        linked_table::choose_device(ui, hands);
         heading(ui, "Breath sources");
         choice(ui, hands, "bfrom");
         let mut may_calibrate = snapshot.knob.is_live || hands.step("knob") > 0;

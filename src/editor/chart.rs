@@ -12,6 +12,8 @@ use chalumeau_core::units::clamped_or;
 
 /// Height of the line above a picture, points.
 const NAME_HEIGHT: f32 = 14.0;
+/// Height of the numbers and the name below a plot, points.
+const X_AXIS: f32 = 30.0;
 
 /// Height of a line of a legend, points.
 pub const LEGEND_LINE: f32 = 15.0;
@@ -65,7 +67,8 @@ impl Chart<'_> {
             tidy(if is_ago { mark.value.abs() } else { mark.value }, mark.step_size)
         });
         let x_axis = if has_x {
-            x_axis.label(egui::RichText::new(self.x_name).font(theme::small()).color(c.quiet))
+            let name = egui::RichText::new(self.x_name).font(theme::small()).color(c.quiet);
+            x_axis.label(name).min_thickness(X_AXIS)
         } else {
             x_axis.formatter(|_, _| String::new())
         };

@@ -213,6 +213,15 @@ impl Hands<'_> {
         self.history.record(Step { changes, preset: Some(preset), ..Step::default() });
     }
 
+    /// Records as a step that one of `count` choices was made, which the window asks for elsewhere.
+    pub fn record_choice(&mut self, id: &'static str, index: usize, count: usize) {
+        if let Some(look) = self.controls.look(id) {
+            let after = index as f32 / count.saturating_sub(1).max(1) as f32;
+            let changes = vec![Change { id, before: look.value, after }];
+            self.history.record(Step { changes, ..Step::default() });
+        }
+    }
+
     /// Sets values that are no new step: undo, redo, A/B.
     pub fn restore(&mut self, values: &[(&'static str, f32)]) {
         for &(id, value) in values {

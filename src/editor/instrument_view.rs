@@ -33,7 +33,13 @@ pub fn draw(
     );
 }
 
-fn left(ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, files: &mut FileBrowser, actions: &mut Vec<Action>) {
+fn left(
+    ui: &mut Ui,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+    files: &mut FileBrowser,
+    actions: &mut Vec<Action>,
+) {
     let c = Colours::here(ui);
     ui.spacing_mut().item_spacing.y = GAP;
     let height = ui.available_height();
@@ -62,7 +68,13 @@ fn left(ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, files: &mut FileBrowser
     });
 }
 
-fn list(ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, files: &mut FileBrowser, actions: &mut Vec<Action>) {
+fn list(
+    ui: &mut Ui,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+    files: &mut FileBrowser,
+    actions: &mut Vec<Action>,
+) {
     let c = Colours::here(ui);
     ui.horizontal(|ui| {
         heading(ui, "Instrument");
@@ -77,6 +89,7 @@ fn list(ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, files: &mut FileBrowser
             let is_here = snapshot.chosen == Some(index);
             if card(ui, c, name, is_here).clicked() && !is_here {
                 actions.push(Action::ChooseInstrument(index));
+                hands.record_choice("instr", index, snapshot.instruments.len());
             }
         }
     });

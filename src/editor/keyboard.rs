@@ -22,6 +22,8 @@ use typed_letters::TypedLetters;
 
 /// Velocity of a note played with Space or a letter.
 const PLAIN: f32 = 0.75;
+/// Velocity of a key that is pressed at its upper edge.
+const SOFTEST: f32 = 0.05;
 
 /// Least height at which a key shows both its letter and its name, points. On a lower one the letter has the place of the name.
 const ROOM_FOR_BOTH: f32 = 80.0;
@@ -35,8 +37,7 @@ const MOST_GROWN: f32 = 1.8;
 const HELP_MARK: f32 = 14.0;
 
 const HELP: &str = "A key that is held shows the note it plays, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
-const LETTERS_HELP: &str =
-    "The letters on the keys play them, too. Page Up and Page Down move the letters by an octave.";
+const LETTERS_HELP: &str = "The letters on the keys play them, too: C softer, V louder. Page Up and Page Down move the letters by an octave.";
 const SWITCH_KEY: &str = "This key makes no sound: the notes that follow take these fingerings, until another key of the row is struck. The colour shows which. *Key switches* in the Breath view moves the row.";
 const SILENT_KEY: &str = "The instrument does not play this note in tune, so the key is silent.";
 
@@ -106,14 +107,17 @@ impl Keyboard {
 
         if let Some(letters) = &mut self.letters {
             let plays = |note: SoundingNote| playable(note.0);
-            letters.play(ui, (lowest.0, highest.0), is_text, PLAIN, plays, actions);
+            letters.play(ui, (lowest.0, highest.0), is_text, plays, actions);
         }
 
         let c = Colours::here(ui);
         let focus = response.has_focus().then_some(chosen);
         let named = |key: u8| names.of_sounding(snapshot.plays(SoundingNote(key))?, transposition);
-        let down = [snapshot.key, self.held].map(|key| key.map(|note| note.0));
-        keys.paint(ui, c, down, focus, named, |key| self.letters.as_ref()?.letter(key));
+        let is_down = |key: u8| {
+            [snapshot.key, self.held].contains(&Some(SoundingNote(key)))
+                || self.letters.as_ref().is_some_and(|letters| letters.holds(key))
+        };
+        keys.paint(ui, c, is_down, focus, named, |key| self.letters.as_ref()?.letter(key));
         if let Some(row) = &row {
             row.paint(ui, c, snapshot.next_fingerings());
         }
@@ -252,7 +256,7 @@ impl Keys {
             .or_else(|| notes().find(|note| !is_black(*note) && hit(note)))?;
         let key = self.key(note);
         let down = ((point.y - key.top()) / key.height()).clamp(0.0, 1.0);
-        Some((note, 0.35 + 0.65 * down))
+        Some((note, SOFTEST + (1.0 - SOFTEST) * down))
     }
 
     /// Paints them; `named` gives the note that a held key is named by, `None` for a silent one; `letter` what is typed to play it.
@@ -260,7 +264,7 @@ impl Keys {
         &self,
         ui: &Ui,
         c: &Colours,
-        down: [Option<u8>; 2],
+        is_down: impl Fn(u8) -> bool,
         focus: Option<u8>,
         named: impl Fn(u8) -> Option<u8>,
         letter: impl Fn(u8) -> Option<&'static str>,
@@ -270,7 +274,7 @@ impl Keys {
             for note in (self.from..=self.to).filter(|&note| is_black(note) == black) {
                 let key = self.key(note);
                 let plain = if black { c.ebony } else { c.ivory };
-                let (is_down, name) = (down.contains(&Some(note)), named(note));
+                let (is_down, name) = (is_down(note), named(note));
                 let fill = if is_down {
                     c.breath
                 } else if name.is_some() {
@@ -301,7 +305,7 @@ impl Keys {
         let font = theme::small_grown(grown);
         let letter = |note: u8| letter(note).filter(|_| named(note).is_some());
         for note in self.from..=self.to {
-            let (key, is_down) = (self.key(note), down.contains(&Some(note)));
+            let (key, is_down) = (self.key(note), is_down(note));
             let Some(letter) = letter(note).filter(|_| !(is_low && is_down)) else { continue };
             let ink = match (is_down, is_black(note)) {
                 (true, _) => c.on_accent,
@@ -320,7 +324,7 @@ impl Keys {
         }
         // A C has the name that every keyboard gives it; a key that is held has the name of the note it plays.
         for note in self.from..=self.to {
-            let (key, is_down) = (self.key(note), down.contains(&Some(note)));
+            let (key, is_down) = (self.key(note), is_down(note));
             let name = match is_down {
                 true => named(note),
                 false if is_low && letter(note).is_some() => None,

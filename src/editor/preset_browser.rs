@@ -13,6 +13,7 @@ use egui::{
 use crate::editor::Action;
 use crate::editor::controls::{Hands, heading};
 use crate::editor::preset_values::{capture, choose, is_changed};
+use crate::editor::slider::select_all;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -44,6 +45,17 @@ enum Form {
     Save { name: String, tags: String, author: String, shows: String },
     Rename { old: String, new: String },
     Delete(String),
+}
+
+impl Form {
+    /// What its first field holds when it opens.
+    fn first(&self) -> &str {
+        match self {
+            Self::Save { name, .. } => name,
+            Self::Rename { new, .. } => new,
+            Self::Delete(_) => "",
+        }
+    }
 }
 
 impl PresetBrowser {
@@ -182,8 +194,9 @@ impl PresetBrowser {
             }
             None => {
                 self.form = offer_forms(ui, snapshot);
-                if self.form.is_some() {
+                if let Some(form) = &self.form {
                     ui.memory_mut(|memory| memory.request_focus(first_field()));
+                    select_all(ui, first_field(), form.first().chars().count());
                 }
             }
         }
@@ -297,7 +310,7 @@ fn draw_form(
             let is_entered = name_field(ui, "Name of the preset", name);
             field(ui, "Tags, with commas", tags);
             field(ui, "Author", author);
-            field(ui, "What it shows", shows);
+            field(ui, "Description", shows);
             let checked = checked_name(name).and_then(|name| match factory::find(&name) {
                 Some(_) => Err("this is a factory preset; choose another name".to_owned()),
                 None => Ok(name),

@@ -31,7 +31,7 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let galley = ui.painter().layout_no_wrap(text.clone(), theme::body(), c.ink);
     let value_size = galley.size() + vec2(10.0, 4.0);
     let value_rect = Rect::from_min_size(pos2(rect.right() - value_size.x + 5.0, rect.top()), value_size);
-    let is_typing = hands.entry.as_ref().is_some_and(|entry| entry.id == id);
+    let is_typing = is_typing(hands, id);
     // The Tab key stops once per slider; Enter opens its value.
     let value_response = ui.interact(value_rect, response.id.with("value"), Sense::CLICK);
 
@@ -53,7 +53,7 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
         } else if value_response.clicked()
             || (response.clicked() && response.has_focus() && ui.input(pressed_enter))
         {
-            *hands.entry = Some(Entry { id, text: text.clone(), is_wrong: false, is_shown: false });
+            open_entry(hands, id, &text);
         }
     }
     if value != look.value {
@@ -101,7 +101,18 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     }))
 }
 
-fn pressed_enter(input: &egui::InputState) -> bool {
+/// Whether a value is being typed for this parameter.
+pub fn is_typing(hands: &Hands, id: &str) -> bool {
+    hands.entry.as_ref().is_some_and(|entry| entry.id == id)
+}
+
+/// Opens the field of a parameter, with its value.
+pub fn open_entry(hands: &mut Hands, id: &'static str, text: &str) {
+    *hands.entry = Some(Entry { id, text: text.to_owned(), is_wrong: false, is_shown: false });
+}
+
+/// Whether Enter was pressed in this frame.
+pub fn pressed_enter(input: &egui::InputState) -> bool {
     input.key_pressed(Key::Enter)
 }
 
@@ -172,7 +183,7 @@ fn paint_slider(
 }
 
 /// The text field over a value. Enter takes it, Escape leaves it, and so does a click elsewhere.
-fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
+pub fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
     let Some(mut entry) = hands.entry.take() else { return };
     let c = Colours::here(ui);
     let field = TextEdit::singleline(&mut entry.text)
@@ -230,7 +241,8 @@ fn say_range(ui: &mut Ui, id: &str, field: Rect) {
     ui.new_child(inside).put(place, egui::Label::new(said).extend());
 }
 
-fn select_all(ui: &Ui, id: egui::Id, chars: usize) {
+/// Selects all characters of a text field, of which there are so many.
+pub fn select_all(ui: &Ui, id: egui::Id, chars: usize) {
     use egui::text::{CCursor, CCursorRange};
     let mut state = egui::text_edit::TextEditState::load(ui.ctx(), id).unwrap_or_default();
     state.cursor.set_char_range(Some(CCursorRange::two(CCursor::new(0), CCursor::new(chars))));

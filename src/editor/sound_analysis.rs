@@ -14,6 +14,9 @@ pub const WINDOW: usize = 8192;
 pub const FLOOR_DB: f32 = -120.0;
 /// Highest frequency shown, Hz.
 const HIGHEST_HZ: f64 = 12_000.0;
+/// What is softer and has another pitch than the note is the air that streams through, dB: it is at most -75 dB at full gain below the
+/// threshold, and a squeak is above.
+const AIR_DBFS: f64 = -60.0;
 
 /// Spectrum, harmonics and pitch of the latest sound.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,7 +49,12 @@ impl SoundAnalysis {
             Some(wanted_hz) => pitch::fundamental_near_hz(steady, rate_hz, wanted_hz),
             None => pitch::fundamental_hz(steady, rate_hz),
         };
-        let Some(f0_hz) = f0_hz else {
+        // Breath alone has a period now and then.
+        let is_air = |f0_hz: &f64| {
+            let off = wanted_hz.map_or(0.0, |wanted_hz| cents(*f0_hz, wanted_hz).abs());
+            off > pitch::OTHER_CENTS && spectrum::rms_dbfs(steady) < AIR_DBFS
+        };
+        let Some(f0_hz) = f0_hz.filter(|f0_hz| !is_air(f0_hz)) else {
             return Self { bin_hz, level_db, ..Self::default() };
         };
         let harmonics = spectrum::harmonic_levels_db(steady, rate_hz, f0_hz);

@@ -183,8 +183,8 @@ pub static PARAMETERS: &[Parameter] = &[
         .flag("--breath-response"),
     entry("bcurve", BREATH, "Breath curve", number([0.5, 2.0], 1.0, 2, ""))
         .help(
-            "Curve from breath to dynamic, where the breath response is played",
-            "Above 1, soft notes get more of the controller's range; below 1, loud notes do.",
+            "Curve from a controller's breath to the dynamic, with the breath response *Played*",
+            "Above 1, soft notes get more of the controller's range; below 1, loud notes do. The velocity of keys does not pass it.",
             "",
         )
         .sets(Sets::Number(SettingNumber::BreathCurve))
@@ -354,8 +354,8 @@ pub static PARAMETERS: &[Parameter] = &[
         .flag("--gain-db"),
     entry("panic", OUTPUT, "Panic", OFF)
         .help(
-            "Ends everything at once",
-            "Silences the instrument when it is switched on, and is Off again.",
+            "Ends all notes at once",
+            "The sound stops, and the keys set the breath again. As a parameter it acts when it is switched on, and is Off again.",
             "",
         )
         .midi("CC120, CC123")

@@ -8,7 +8,7 @@ use super::breath_sources::BreathSources;
 use super::params::knob::ReedSource;
 use super::part_reeds::PartReeds;
 use super::reed_controllers::ReedControllers;
-use super::translate_events::{EventTranslator, raw7, untangled};
+use super::translate_events::{EventTranslator, WINDOW_NOTE, raw7, untangled};
 use crate::controllers::ControllerLinks;
 use crate::controllers::breath_input::BreathInput;
 use crate::controllers::source_curves::CurvesNow;
@@ -97,7 +97,8 @@ impl HostInputs {
         push(&mut self.events, event);
     }
 
-    /// What the keys of the window say; it shows the first player.
+    /// What the keys of the window say. They play chords as the host's keys do; all else is for the first player, which the window
+    /// shows.
     pub fn window_key(&mut self, event: Event, key_switches: KeySwitches) {
         match event {
             Event::Breath(unit) => self.breath_sources().blow(BreathInput::Parameter, unit),
@@ -108,10 +109,17 @@ impl HostInputs {
             Event::NoteOn { note, .. } => key_switches.chosen(note.0),
             _ => None,
         };
-        self.say(match chosen {
-            Some(fingerings) => Event::Fingerings(fingerings).into(),
-            None => PartEvent { to: To::Player(0), event },
-        });
+        if let Some(fingerings) = chosen {
+            self.say(Event::Fingerings(fingerings).into());
+        } else if self.translator.parts() > 1 && matches!(event, Event::NoteOn { .. } | Event::NoteOff { .. })
+        {
+            for &event in self.translator.window_note(&event) {
+                push(&mut self.events, event);
+            }
+            self.note_ends(0);
+        } else {
+            self.say(PartEvent { to: To::Player(0), event });
+        }
     }
 
     /// The latest MIDI program change, 0..=127, once.
@@ -325,7 +333,8 @@ fn push(events: &mut Vec<PartEvent>, event: PartEvent) {
 
 /// Adds the end of a note, without allocating.
 fn end(ended: &mut Vec<(u32, Note)>, at: u32, note: Note) {
-    if ended.len() < ended.capacity() {
+    // The host has not begun what the window plays.
+    if note.id != WINDOW_NOTE && ended.len() < ended.capacity() {
         ended.push((at, note));
     }
 }
@@ -380,6 +389,31 @@ mod tests {
             midi(&mut inputs, reeds, &[[0xB0, 1, 127]]);
             assert!(inputs.reed_factors(reeds)[0] > 1.5, "and a wheel that moves is a wheel");
         }
+    }
+
+    #[test]
+    fn keys_of_the_window_play_chords_whose_ends_no_host_hears_of() {
+        let mut inputs = HostInputs::default();
+        inputs.begin_block(3);
+        let keys = [60, 64, 67].map(SoundingNote);
+        let switches = KeySwitches::default();
+        for note in keys {
+            inputs.window_key(Event::NoteOn { note, velocity: 0.5 }, switches);
+        }
+        let links = ControllerLinks::default();
+        let mut begun = Vec::new();
+        while let Some(timed) = inputs.next(|| None, PluginApi::Clap, NO_REED, &links) {
+            if let PartEvent { to, event: Event::NoteOn { note, .. } } = timed.event {
+                begun.push((to, note));
+            }
+        }
+        assert_eq!(begun, [0, 1, 2].map(|part| (To::Player(part), keys[usize::from(part)])));
+        inputs.begin_block(3);
+        for note in keys {
+            inputs.window_key(Event::NoteOff { note }, switches);
+        }
+        inputs.fall_silent(0, |_| true);
+        assert_eq!(inputs.ended(), []);
     }
 
     #[test]

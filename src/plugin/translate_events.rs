@@ -16,7 +16,10 @@ use chalumeau_core::control::midi::links::{Link, Links, MOST};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::notes::{HeldNote, Note, NoteAddress, NoteExpression};
 use chalumeau_core::control::parts::Parts;
-use chalumeau_core::event::PartEvent;
+use chalumeau_core::event::{Event, PartEvent};
+
+/// The id of notes from the keys of the window. Those of a host are 0 or more.
+pub const WINDOW_NOTE: Option<i32> = Some(-2);
 
 /// Translates one event at a time, and keeps the state between them. Real-time safe throughout.
 #[derive(Debug, Default)]
@@ -63,6 +66,20 @@ impl EventTranslator {
                 Some((address, expression)) => self.midi.express(address, expression),
                 None => &[],
             },
+        }
+    }
+
+    /// The events of a key of the window, which has no channel.
+    pub fn window_note(&mut self, event: &Event) -> &[PartEvent] {
+        match *event {
+            Event::NoteOn { note, velocity } => {
+                let note = Note { id: WINDOW_NOTE, channel: 0, key: note.0 };
+                self.midi.strike(note, raw7(velocity).max(1))
+            }
+            Event::NoteOff { note } => {
+                self.midi.release(NoteAddress { id: WINDOW_NOTE, channel: Some(0), key: Some(note.0) })
+            }
+            _ => &[],
         }
     }
 
@@ -220,7 +237,6 @@ fn raw14(value: f32) -> u16 {
 mod tests {
     use super::*;
     use chalumeau_core::control::midi::MidiDecoder;
-    use chalumeau_core::event::Event;
     use chalumeau_core::units::SoundingNote;
 
     type Host = NoteEvent<()>;

@@ -484,6 +484,21 @@ fn wrong_text_is_kept_until_it_is_right_and_leaving_it_changes_nothing() {
 }
 
 #[test]
+fn a_round_control_takes_a_typed_value() {
+    let mut window = Window::new(Tab::Play, chalumeau::editor::SIZE);
+    window.harness.get_by_role_and_label(Role::Slider, "Reed").focus();
+    window.harness.run();
+    window.harness.key_press(Key::Enter);
+    window.harness.run();
+    window.harness.get_by_label("Reed strength, value").type_text("3.5");
+    window.harness.run();
+    window.harness.key_press(Key::Enter);
+    window.harness.run();
+    assert_eq!(window.host.plain("stren"), 3.5);
+    assert!(window.harness.query_by_label("Reed strength, value").is_none());
+}
+
+#[test]
 fn automation_shows_at_once() {
     let mut window = Window::tall(Tab::Reed);
     window.host.automate("lip", 0.9);

@@ -15,7 +15,7 @@ use crate::support::Fake;
 const KNOB: Source = Source::Controller(21);
 
 fn linking(tab: Tab) -> Window {
-    Window::with_host(tab, (1100.0, 2400.0), Fake::linking())
+    Window::with_host(tab, (1100.0, 2650.0), Fake::linking())
 }
 
 fn links(window: &Window) -> Vec<ParameterLink> {
@@ -77,6 +77,7 @@ fn a_device_brings_its_links_and_values_and_the_next_takes_them_back() {
         window.harness.run();
         assert_eq!(links(&window).len(), links_now, "{device}");
         assert_eq!(window.host.text("wheel", window.host.value("wheel")), wheel, "{device}");
+        window.harness.get_by_label(&chalumeau::controllers::factory::find(device).unwrap().shows);
     }
 }
 

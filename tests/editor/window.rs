@@ -146,6 +146,18 @@ fn letters_play_in_a_window_without_a_host_only() {
     assert_eq!(type_key(&mut window, &[(Key::W, false), (Key::W, true)]), [], "a repeat is no new stroke");
     assert_eq!(type_key(&mut window, &[(Key::PageUp, true), (Key::PageUp, false)]), []);
     assert_eq!(type_key(&mut window, &[(Key::W, false), (Key::S, true)]), [off(61), on(74)]);
+    // C and V make what follows softer and louder.
+    for _ in 0..3 {
+        assert_eq!(type_key(&mut window, &[(Key::C, true), (Key::C, false)]), []);
+    }
+    let [Action::NoteOn { velocity, .. }] = type_key(&mut window, &[(Key::D, true)])[..] else {
+        panic!("no note")
+    };
+    assert_eq!(velocity, 0.375);
+    for _ in 0..3 {
+        type_key(&mut window, &[(Key::V, true), (Key::V, false)]);
+    }
+    assert_eq!(type_key(&mut window, &[(Key::D, false)]), [off(76)]);
     window.harness.event(egui::Event::WindowFocused(false));
     window.harness.run();
     assert_eq!(window.actions(), [off(74)], "who leaves the window lets go");
@@ -411,6 +423,9 @@ fn devices_tests_and_files_are_asked_for() {
     let mut window = Window::tall(Tab::Instrument);
     click(&mut window, "Instrument Bass clarinet");
     assert_eq!(window.actions(), [Action::ChooseInstrument(4)]);
+    window.host.told();
+    click(&mut window, "Undo");
+    assert!(window.host.told().contains(&Told::Begin("instr".into())), "the choice is a step");
 }
 
 #[test]
@@ -729,7 +744,7 @@ fn the_play_view_says_which_instrument_is_loaded() {
     window.harness.get_by_label("B flat clarinet, Boehm system, in B flat, 67 cm long");
     window.snapshot.borrow_mut().instrument = Bundled::Bass.file().into();
     window.harness.run();
-    window.harness.get_by_label("B flat bass clarinet, Boehm system, in B flat, 134 cm long");
+    window.harness.get_by_label("B flat bass clarinet to low C, Boehm system, in B flat, 173 cm long");
 }
 
 #[test]

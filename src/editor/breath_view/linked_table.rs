@@ -1,25 +1,50 @@
-//! The table of controllers that the user has linked to parameters, and the devices to choose from.
+//! The devices to choose from, and the table of controllers that the user has linked to parameters.
 
 use egui::{DragValue, RichText, Role, Ui, WidgetInfo};
 
-use crate::controllers::{ParameterLink, factory, source_name};
+use crate::controllers::{ControllerMap, ParameterLink, factory, source_name};
 use crate::editor::controls::{Hands, heading};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
-use crate::parameters::Kind;
+use crate::parameters::{Kind, Parameter};
+
+/// Of the list of devices, points: all of them at once.
+const LIST_HEIGHT: f32 = 320.0;
+
+/// Whether links and parameters are as this device needs them.
+fn is_set(hands: &Hands, map: &ControllerMap) -> bool {
+    let near = |parameter: &Parameter, value| {
+        let look = hands.controls.look(parameter.id);
+        look.is_none_or(|look| (look.value - parameter.normalized(value)).abs() < 1e-4)
+    };
+    let links = hands.controls.links().map(|links| links.all());
+    links.is_some_and(|all| all.iter().map(|(link, _)| link).eq(&map.links))
+        && factory::values(map).into_iter().all(|(parameter, value)| near(parameter, value))
+}
 
 /// A list of devices; the one that is chosen replaces all links, and sets what devices need.
-fn choose_device(ui: &mut Ui, hands: &mut Hands) {
+pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
+    if hands.controls.links().is_none() {
+        return;
+    }
+    let c = Colours::here(ui);
+    heading(ui, "Device");
     let list = egui::ComboBox::from_id_salt("controllers of a device").width(ui.available_width() - 8.0);
+    let now = factory::all().iter().find(|map| is_set(hands, map));
     let mut chosen = None;
-    let response = list.selected_text("Choose a device").show_ui(ui, |ui| {
+    let text = now.map_or("Choose a device", |map| map.name.as_str());
+    let response = list.height(LIST_HEIGHT).selected_text(text).show_ui(ui, |ui| {
         for map in factory::all() {
-            if ui.selectable_label(false, &map.name).on_hover_text(&map.shows).clicked() {
+            let is_here = now == Some(map);
+            if ui.selectable_label(is_here, &map.name).on_hover_text(&map.shows).clicked() {
                 chosen = Some(map);
             }
         }
     });
     response.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, "Choose a device"));
+    if let Some(map) = now {
+        ui.label(RichText::new(&map.shows).font(theme::small()).color(c.quiet));
+    }
     let (Some(map), Some(links)) = (chosen, hands.controls.links()) else { return };
     links.learn(None);
     links.replace(&map.links);
@@ -36,7 +61,6 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands) {
     }
     let c = Colours::here(ui);
     heading(ui, "Linked controllers");
-    choose_device(ui, hands);
     let Some(links) = hands.controls.links() else { return };
     let all = links.all();
     let quiet = |text: String| RichText::new(text).font(theme::small()).color(c.quiet);

@@ -1,5 +1,5 @@
 //! Letters of the computer's keyboard as a piano, for a window that has no host: the row of A has the white keys, the row above it
-//! the black ones. Page Up and Page Down move them by an octave.
+//! the black ones. Page Up and Page Down move them by an octave, C and V make them softer and louder, as in many DAWs.
 //!
 //! The window system tells letters, not places, so the sixth black key has two of them: Y, and Z where that is in its place.
 
@@ -31,10 +31,16 @@ const LETTERS: [(Key, u8); 17] = [
 /// Where the lowest letter begins: C4.
 const FIRST: u8 = 60;
 
-/// The letters that are down, and where they play.
+/// Velocity of a letter at first, how far it goes, and by how much C and V change it: from pp to ff, as the breath of keys has it.
+const VELOCITY: f32 = 0.75;
+const VELOCITIES: (f32, f32) = (0.125, 1.0);
+const VELOCITY_STEP: f32 = 0.125;
+
+/// The letters that are down, and where and how they play.
 #[derive(Clone, Debug)]
 pub struct TypedLetters {
     lowest: u8,
+    velocity: f32,
     held: Vec<(Key, SoundingNote)>,
     /// Came up in the last frame. Some window systems repeat a held letter as up and down: such a one does not come up.
     leaving: Vec<Key>,
@@ -42,7 +48,7 @@ pub struct TypedLetters {
 
 impl Default for TypedLetters {
     fn default() -> Self {
-        Self { lowest: FIRST, held: Vec::new(), leaving: Vec::new() }
+        Self { lowest: FIRST, velocity: VELOCITY, held: Vec::new(), leaving: Vec::new() }
     }
 }
 
@@ -53,6 +59,11 @@ impl TypedLetters {
         LETTERS.iter().find(|(_, semitones)| *semitones == above).map(|(key, _)| key.name())
     }
 
+    /// Whether a letter holds this key down.
+    pub fn holds(&self, note: u8) -> bool {
+        self.held.iter().any(|(_, held)| held.0 == note)
+    }
+
     /// Plays what has been typed since the last frame. `range`: the instrument's lowest and highest key; `is_text`: letters are text now;
     /// `plays`: whether a key sounds.
     pub fn play(
@@ -60,7 +71,6 @@ impl TypedLetters {
         ui: &Ui,
         range: (u8, u8),
         is_text: bool,
-        velocity: f32,
         plays: impl Fn(SoundingNote) -> bool,
         actions: &mut Vec<Action>,
     ) {
@@ -92,9 +102,13 @@ impl TypedLetters {
                 Key::PageDown if is_down => {
                     self.lowest = self.lowest.saturating_sub(12).max(octave(range.0));
                 }
+                Key::C | Key::V if is_down => {
+                    let step = if key == Key::V { VELOCITY_STEP } else { -VELOCITY_STEP };
+                    self.velocity = (self.velocity + step).clamp(VELOCITIES.0, VELOCITIES.1);
+                }
                 _ if is_down => {
                     self.leaving.retain(|leaving| *leaving != key);
-                    self.press(key, velocity, &plays, actions);
+                    self.press(key, &plays, actions);
                 }
                 _ => self.leaving.push(key),
             }
@@ -112,20 +126,14 @@ impl TypedLetters {
         }
     }
 
-    fn press(
-        &mut self,
-        key: Key,
-        velocity: f32,
-        plays: impl Fn(SoundingNote) -> bool,
-        actions: &mut Vec<Action>,
-    ) {
+    fn press(&mut self, key: Key, plays: impl Fn(SoundingNote) -> bool, actions: &mut Vec<Action>) {
         let Some((_, semitones)) = LETTERS.iter().find(|(letter, _)| *letter == key) else { return };
         let note = SoundingNote(self.lowest + semitones);
         if self.held.iter().any(|(held, _)| *held == key) || !plays(note) {
             return;
         }
         self.held.push((key, note));
-        actions.push(Action::NoteOn { note, velocity });
+        actions.push(Action::NoteOn { note, velocity: self.velocity });
     }
 
     fn lift(&mut self, key: Key, actions: &mut Vec<Action>) {

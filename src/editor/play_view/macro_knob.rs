@@ -1,15 +1,15 @@
 //! A main control as a round knob. It moves by dragging up and down (Shift: ten times finer) and by arrow keys when it has the
-//! focus. A double click or Ctrl-click sets the default.
+//! focus. A double click or Ctrl-click sets the default. A click on its value, or Enter, opens a text field.
 
 use egui::{
-    Align2, Color32, CursorIcon, FontId, Pos2, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
 use crate::editor::controls::{Hands, Look, teach};
 use crate::editor::host_marks;
 use crate::editor::key_steps::KeySteps;
 use crate::editor::linked_controllers;
-use crate::editor::slider::moved_by_pointer;
+use crate::editor::slider::{is_typing, moved_by_pointer, open_entry, pressed_enter, type_value};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::editor::widgets::one_line;
@@ -19,7 +19,9 @@ const TRAVEL: f32 = 160.0;
 const KEYS: KeySteps = KeySteps { share: 0.02, has_vertical: true };
 /// The arc, from its low end to its high end, radians clockwise from the right.
 const ARC: (f32, f32) = (0.75 * std::f32::consts::PI, 2.25 * std::f32::consts::PI);
-const HOW: &str = "Drag up or down; Shift: finer. Double click or Ctrl-click: default. Arrow keys move it.";
+const HOW: &str = "Drag up or down, or the arrow keys; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
+/// Size of the field for a typed value, points.
+const FIELD: Vec2 = vec2(84.0, 22.0);
 
 /// A main control.
 pub struct Macro {
@@ -58,8 +60,12 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
     let (rect, mut response) = ui.allocate_exact_size(size, Sense::click_and_drag());
     let drag = response.drag_delta();
     let share = (drag.x - drag.y) / TRAVEL;
-    let mut value = moved_by_pointer(ui, hands, of.id, &look, &response, share).unwrap_or(look.value);
-    if response.has_focus() {
+    let is_typing = is_typing(hands, of.id);
+    let mut value = look.value;
+    if !is_typing {
+        value = moved_by_pointer(ui, hands, of.id, &look, &response, share).unwrap_or(value);
+    }
+    if response.has_focus() && !is_typing {
         value = KEYS.moved(ui, hands, of.id, &look, &response).unwrap_or(value);
     }
     if response.double_clicked() || (response.clicked() && ui.input(|input| input.modifiers.command)) {
@@ -84,7 +90,7 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
     let radius = 0.5 * (size.y - words);
     let centre = pos2(rect.center().x, rect.top() + radius + 6.0);
     paint(ui, c, centre, radius, &look, value, is_touched);
-    let painter = ui.painter();
+    let painter = ui.painter().clone();
     let at = pos2(centre.x, rect.top() + 2.0 * radius + 10.0);
     let font = FontId::proportional(if is_small { 13.0 } else { 14.0 * grown });
     let name = painter.text(at, Align2::CENTER_TOP, of.name, font, c.ink);
@@ -101,8 +107,20 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
     };
     let words = one_line(ui, words, theme::small_grown(grown), ink, size.x - 4.0);
     let at = pos2(centre.x - 0.5 * words.size().x, name.bottom() + 1.0);
-    let bottom = at.y + words.size().y;
-    painter.galley(at, words, ink);
+    let of_value = Rect::from_min_size(at, words.size());
+    let bottom = of_value.bottom();
+    let value_response =
+        ui.interact(of_value.expand2(vec2(4.0, 1.0)), response.id.with("value"), Sense::CLICK);
+    if is_typing {
+        type_value(ui, hands, of.id, Rect::from_center_size(of_value.center(), FIELD));
+    } else {
+        painter.galley(at, words, ink);
+        let is_entered = response.clicked() && response.has_focus() && ui.input(pressed_enter);
+        if value_response.clicked() || is_entered {
+            open_entry(hands, of.id, &text);
+        }
+    }
+    value_response.on_hover_cursor(CursorIcon::Text);
     if has_ends {
         let at = pos2(centre.x, bottom + 1.0);
         painter.text(

@@ -172,7 +172,11 @@ impl SnapshotThread {
         fingering: usize,
     ) {
         let design = self.feel_design();
-        let analysed = self.analysis.as_ref().map(|analysis| analysis.drawn().clone());
+        // That of an instrument before its holes were moved serves until the new one is there; that of another instrument does not.
+        let is_of_current =
+            |drawn: &DrawnInstrument| current.is_none_or(|current| drawn.key == current.request.key);
+        let analysed = self.analysis.as_ref().map(|analysis| analysis.drawn().clone()).filter(is_of_current);
+        let is_analysed = analysed.is_some();
         let Some(DrawnInstrument { file, as_built, key, .. }) =
             analysed.or_else(|| self.drawn_at_first(current))
         else {
@@ -191,13 +195,13 @@ impl SnapshotThread {
         snapshot.fingerings = self.fingerings.look(self.shared.fingerings_for(), &file, air, a4_hz);
         snapshot.openings = open.iter().map(|&open| f32::from(u8::from(open))).collect();
         snapshot.instrument = file;
-        let Some(analysis) = &mut self.analysis else { return };
+        let Some(analysis) = self.analysis.as_mut().filter(|_| is_analysed) else { return };
         snapshot.requirement = analysis.requirement(fingering, &snapshot.played());
         snapshot.feel = analysis.feel(fingering, &snapshot.settings, &design);
         snapshot.standing = analysis.standing_wave(fingering, &open);
     }
 
-    /// The instrument that sounds while there is no analysis yet: an instrument of the user's own is fitted first, which takes up
+    /// The instrument that sounds while there is no analysis of it yet: an instrument of the user's own is fitted first, which takes up
     /// to a minute.
     fn drawn_at_first(&mut self, current: Option<&CurrentInstrument>) -> Option<DrawnInstrument> {
         let current = current?;
@@ -247,7 +251,7 @@ impl SnapshotThread {
     }
 
     /// Analyses a new instrument (about 1 s) on a thread of its own: a window that has just been opened shows from its first
-    /// moment what is played. The old view stays until then.
+    /// moment what is played.
     fn analyse(&mut self, current: Option<&CurrentInstrument>) {
         if let Some(done) = self.analysing.take_if(|analysing| analysing.is_finished()) {
             self.analysis = done.join().ok().or_else(|| self.analysis.take());
