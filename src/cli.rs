@@ -193,6 +193,9 @@ enum Failure {
     #[cfg(feature = "simulator")]
     #[error("the simulated knob stopped: {0}")]
     Knob(io::Error),
+    #[cfg(feature = "devices")]
+    #[error("the knob was lost after {seconds:.1} s and did not come back: {text}")]
+    KnobLost { seconds: f64, text: String },
     #[error(transparent)]
     Feel(#[from] FeelRefused),
     #[error("cannot write the table: {0}")]

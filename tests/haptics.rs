@@ -522,7 +522,7 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     says(
         FeelDesign { strength_mnm: 120.0, ..default },
         standard,
-        &["ceiling is 100", "lower the strength to"],
+        &["ceiling is 100", "lower Feel torque to"],
     );
     says(FeelDesign { contrast: 6.0, ..default }, standard, &["Contrast must lie in 1..5, got 6"]);
     says(FeelDesign { contrast: f64::NAN, ..default }, standard, &["Contrast", "NaN"]);
@@ -534,7 +534,7 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     says(
         FeelDesign { law: TorqueLaw::Pressure, place: 5.0, ..default },
         Settings { zeta: 0.1, ..standard },
-        &["too near closure", "lower Place"],
+        &["too near closure", "lower Feel place"],
     );
     // Every note closes at the same angle, which is too near for this reed.
     says(
@@ -826,7 +826,7 @@ mod command {
             ("haptic --all --curve", "choose a note with --written"),
             ("haptic --written 20", "has no fingering"),
             ("haptic --all --reference 20", "has no fingering"),
-            ("haptic --all --torque 300", "lower the strength"),
+            ("haptic --all --torque 300", "lower --torque"),
             ("haptic --all --contrast 9", "must lie in 1..5"),
             ("haptic --all --law round", "possible values"),
         ] {

@@ -134,6 +134,12 @@ impl BatchCommand {
         if self.dry_run {
             return dry_run(&jobs);
         }
+        if self.into.is_file() {
+            return Err(Failure::Usage(format!(
+                "--into {} is a file; give the name of a folder",
+                self.into.display()
+            )));
+        }
         fs::create_dir_all(&self.into)
             .map_err(|error| self.failure(&format!("cannot make {}: {error}", self.into.display())))?;
         let header = format!("file,{},length_s,rate_hz,peak_dbfs,rms_dbfs", plan.names.join(","));

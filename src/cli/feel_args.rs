@@ -169,14 +169,11 @@ pub fn refused_in_flags(refused: FeelRefused, ceiling: &str, has_reed: bool) -> 
             format!("lower the mark (--detent), or raise {ceiling}")
         }
         FeelRefused::Ceiling { strength_mnm, .. } => {
-            format!(
-                "lower the strength (--torque) to {strength_mnm:.0} mNm or less, lower --contrast, or raise {ceiling}"
-            )
+            format!("lower --torque to {strength_mnm:.0} mNm or less, lower --contrast, or raise {ceiling}")
         }
-        FeelRefused::Stiffness { .. } => "lower the strength (--torque), or lengthen --travel".to_owned(),
+        FeelRefused::Stiffness { .. } => "lower --torque, or lengthen --travel".to_owned(),
         FeelRefused::Push { .. } => {
-            "lower the mark (--detent) or the strength (--torque), lengthen --travel, or take --law pressure"
-                .to_owned()
+            "lower the mark (--detent) or --torque, lengthen --travel, or take --law pressure".to_owned()
         }
         _ => return refused.into(),
     };

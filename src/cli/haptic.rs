@@ -15,6 +15,8 @@ use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::reed::ReedTables;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
+use chalumeau_core::units::WrittenNote;
+use chalumeau_knob::touch::feel::NO_MOTOR;
 use clap::Args;
 
 /// Step of the curve, degrees: one of the knob's encoder.
@@ -38,7 +40,8 @@ Examples:
 /// extinction gamma_off above which the shut reed is silent. On the knob they lie at a_on_deg and a_off_deg; at
 /// a_close_deg a resting reed with a sharp facing would be shut. Contrast above 1 exaggerates how the torque differs between notes, Place above 1
 /// how their angles differ; the requirement itself does not change. At a_on_deg the knob blows with gamma_sounding, where the
-/// reed as it moves begins to sound.
+/// reed as it moves begins to sound. All pressures are those of the transfer-matrix model; `knob`, `report` and the plugin take those of
+/// the waveguide that is played, up to 2 % apart.
 ///
 /// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding; a note
 /// for which the theory finds no pressures has nan for them. A note that does not speak in tune and stays silent, such as C#7, has numbers. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
@@ -118,13 +121,18 @@ impl FeltReedArgs {
         self.reed.bore_and_reed(file)
     }
 
-    /// The feel of every note.
-    pub fn feel(&self, file: &InstrumentFile) -> Result<FeelTable, Failure> {
+    /// The feel of every note, where the limits allow that of all of them, or of the one `note` that is asked for.
+    pub fn feel(&self, file: &InstrumentFile, note: Option<WrittenNote>) -> Result<FeelTable, Failure> {
         let design = self.feel.design(file)?;
         let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
         let (bore, reed) = self.bore_and_reed(file)?;
-        FeelTable::new(&bore, &design, &reed, &limits)
-            .map_err(|refused| refused_in_flags(refused, "--ceiling", true))
+        let fingering = note.and_then(|note| bore.written().position(|written| written == note));
+        let feel = match fingering {
+            Some(fingering) => FeelTable::new(&bore, &design, &reed, &NO_MOTOR)
+                .and_then(|table| table.accepts(fingering, &design, &limits).map(|()| table)),
+            None => FeelTable::new(&bore, &design, &reed, &limits),
+        };
+        feel.map_err(|refused| refused_in_flags(refused, "--ceiling", true))
     }
 }
 
@@ -137,7 +145,7 @@ impl HapticCommand {
             let right = "choose a note with --written, or leave --curve out for the table of all notes";
             return Err(Failure::Usage(format!("--curve is for one note; {right}")));
         }
-        let feel = self.felt.feel(&file)?;
+        let feel = self.felt.feel(&file, self.notes.one())?;
         let wanted = |feel: &&NoteFeel| notes.contains(&feel.written);
         if self.curve {
             return feel.notes().iter().filter(wanted).try_for_each(|note| self.curve(note));

@@ -10,8 +10,8 @@ use chalumeau_core::haptics::{FeelDesign, FeelRefused, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::{
-    FIRST_CEILING_MNM, HARD_CEILING_MNM, Hooks, KnobChoice, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase,
-    Release, StateSample, serial_text,
+    FIRST_CEILING_MNM, HARD_CEILING_MNM, Hooks, KnobChoice, KnobLink, LinkStats, LinkStatus,
+    OFFERED_CEILING_MNM, Phase, Release, StateSample, serial_text,
 };
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
@@ -248,6 +248,8 @@ impl KnobCommand {
         let mut enter: Option<Arc<AtomicBool>> = None;
         let mut shown = Instant::now();
         let mut said = String::new();
+        // The latest of a connected knob, whether it is lost now, and when it was.
+        let (mut stats, mut is_lost, mut lost_s) = (LinkStats::default(), false, 0.0);
         // This thread obeys the user: what it prints is what the user sees. When it waits for its terminal, it beats no more.
         let heart = link.heartbeat("this program");
         let [stop, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
@@ -269,14 +271,21 @@ impl KnobCommand {
                 break;
             }
             let status = link.status();
-            let live = matches!(status.phase, Phase::Live | Phase::ReadOnly);
-            if live && live_since.is_none() {
+            let is_connected = matches!(status.phase, Phase::Live | Phase::ReadOnly);
+            if is_connected {
+                (stats, is_lost) = (status.stats, false);
+            } else if live_since.is_some() && !is_lost {
+                (lost_s, is_lost) = (began.elapsed().as_secs_f64(), true);
+            }
+            // Where it stands decides whether it may be armed.
+            if is_connected && live_since.is_none() && (self.arm.is_none() || status.angle_deg.is_some()) {
                 live_since = Some(Instant::now());
                 note = settle(&status)?;
-                if self.arm.is_some() && began.elapsed() > PROMPTLY {
-                    enter = Some(ask_for_enter()?);
-                } else {
-                    self.begin(link);
+                let stray_deg = status.stray_deg.filter(|_| !self.zero);
+                match (self.arm.is_some(), stray_deg) {
+                    (true, Some(stray_deg)) => enter = Some(ask_for_enter(&Doubt::Stray(stray_deg))?),
+                    (true, None) if began.elapsed() > PROMPTLY => enter = Some(ask_for_enter(&Doubt::Late)?),
+                    _ => self.begin(link),
                 }
             }
             if enter.take_if(|pressed| pressed.load(Ordering::Relaxed)).is_some() {
@@ -326,7 +335,6 @@ impl KnobCommand {
         if std::io::stderr().is_terminal() {
             say!("");
         }
-        let stats = link.status().stats;
         say!(
             "{} positions, {:.0} a second; {} lost, {} damaged, {} duplicated; jitter p50 {:.2} ms, p99 {:.2} ms",
             stats.states,
@@ -340,18 +348,40 @@ impl KnobCommand {
         if let Some(take) = take {
             take.keep()?;
         }
+        if is_lost {
+            return Err(Failure::KnobLost { seconds: lost_s, text: link.status().text });
+        }
         Ok(())
     }
 }
 
+/// Why the user is asked before the knob is armed.
+enum Doubt {
+    /// It answered when the user may have turned to something else.
+    Late,
+    /// It stands so far from a zero that nobody has set, degrees.
+    Stray(f32),
+}
+
 /// Asks for Enter; true once it is pressed. The answer is read elsewhere: this thread goes on obeying the user.
-fn ask_for_enter() -> Result<Arc<AtomicBool>, Failure> {
-    let waited_s = PROMPTLY.as_secs_f64();
+fn ask_for_enter(doubt: &Doubt) -> Result<Arc<AtomicBool>, Failure> {
+    let (reason, way_out) = match doubt {
+        Doubt::Late => (
+            format!("the knob answered only after {} s", PROMPTLY.as_secs_f64()),
+            "nobody is at a terminal to say that it may be armed now: start this command again",
+        ),
+        Doubt::Stray(stray_deg) => (
+            format!(
+                "the knob stands {stray_deg:.0} degrees from its zero, and may turn back there by itself"
+            ),
+            "let it go where blowing should begin, and add --zero",
+        ),
+    };
     if !std::io::stdin().is_terminal() {
-        return Err(Failure::Usage(format!(
-            "not armed: the knob answered only after {waited_s} s, and nobody is at a terminal to say that it may be armed now: start \
-             this command again"
-        )));
+        return Err(Failure::Usage(format!("not armed: {reason}; {way_out}")));
+    }
+    if let Doubt::Stray(_) = doubt {
+        say!("Not armed yet: {reason}. Ctrl-C ends; --zero makes the present position zero");
     }
     say!("The knob is here. Let go of it, and press Enter to arm it; Ctrl-C ends");
     let pressed = Arc::new(AtomicBool::new(false));
@@ -389,6 +419,9 @@ fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, said: &mut String
         [&status.alarm, &status.restriction, &status.last_refusal, &status.notice].into_iter().flatten()
     {
         words = format!("{words}; {more}");
+    }
+    if words.ends_with("arm again") {
+        words.push_str(": end with Ctrl-C, and start the same command");
     }
     if words != *said {
         let fresh = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };

@@ -62,6 +62,9 @@ pub struct KnobSimCommand {
     /// Write t_us,angle_deg,velocity_rpm,torque_mnm,hand_mnm,armed,feel_id, 500 lines a second
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    /// Replace an existing file
+    #[arg(long, requires = "log")]
+    force: bool,
     /// Print no status lines
     #[arg(long)]
     quiet: bool,
@@ -185,7 +188,7 @@ impl KnobSimCommand {
         let stopped = Arc::clone(&stop);
         ctrlc::set_handler(move || stopped.store(true, Ordering::Relaxed))
             .map_err(|e| Failure::Knob(io::Error::other(e)))?;
-        files::keep_apart(files::READ, &[self.hand.deed.script.as_deref()], &[self.log.as_deref()])?;
+        files::check(files::READ, &[self.hand.deed.script.as_deref()], &[self.log.as_deref()], self.force)?;
         let mut server = self.server()?;
         if let Some(path) = &self.log {
             server.log_to(path).map_err(|source| Failure::Write { path: path.clone(), source })?;

@@ -3,6 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, named, number};
 use crate::cli::plot_args::PlotArgs;
+use crate::cli::progress_bar::waiting;
 use crate::cli::shared_args::{counted, within};
 use crate::wav;
 use chalumeau_core::analysis::recording::{self, Note};
@@ -13,6 +14,11 @@ use std::path::PathBuf;
 
 /// The longest part that is measured, s: ten minutes need 1 GB at 48 kHz, and half a minute.
 const LONGEST_S: f64 = 600.0;
+
+/// A note whose lowest harmonics all lie below this is the common period of several, dB re the strongest (by judgement; a clarinet's
+/// first lies within some 20 dB).
+const HOLLOW_DB: f64 = -30.0;
+const LOWEST_HARMONICS: usize = 2;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -78,7 +84,9 @@ impl MeasureCommand {
         let harmonics: Vec<_> = (1..=HARMONICS).map(|n| format!("h{n}_db")).collect();
         let columns = "start_s,end_s,sounding_midi,name,f_hz,cents,level_dbfs,t90_s,centroid_hz";
         let mut table = self.table.open(&format!("{columns},{}", harmonics.join(",")))?;
+        let spinner = waiting("finding the notes");
         let (notes, track) = recording::notes(&sound.samples, f64::from(sound.rate));
+        spinner.finish_and_clear();
         let channel = match self.channel {
             Some(channel) => format!("channel {channel} of {}", sound.channels),
             None if sound.channels == 1 => "mono".to_owned(),
@@ -110,6 +118,15 @@ impl MeasureCommand {
         table.finish()?;
         if notes.is_empty() {
             say!("note: no note was found; `chalumeau help measure` says what is one");
+        }
+        let is_hollow =
+            |note: &&Note| note.levels_db.iter().take(LOWEST_HARMONICS).all(|level| *level < HOLLOW_DB);
+        match notes.iter().filter(is_hollow).count() {
+            0 => {}
+            count => say!(
+                "note: {} next to nothing at the fundamental; is there more than one voice? Such notes are wrong",
+                if count == 1 { "1 note has".to_owned() } else { format!("{count} notes have") }
+            ),
         }
         plot.draw(|| {
             chalumeau_figure::recording::figure(&name, &remark, &notes, &names, &track, self.a4, self.from)

@@ -147,7 +147,7 @@ pub fn settings(pairs: &Pairs, instrument: &InstrumentFile) -> Result<Settings, 
 /// The feel of every note, as `chalumeau haptic` has it. Takes a second.
 pub fn feel(pairs: &Pairs, instrument: InstrumentFile) -> Result<FeelTable, String> {
     let args: FeltReedArgs = read(pairs)?;
-    args.feel(&instrument).map_err(|failure| failure.to_string())
+    args.feel(&instrument, None).map_err(|failure| failure.to_string())
 }
 
 /// A bore and the reed that is played on it, from which thresholds follow, as `chalumeau haptic` has them. Takes a second.

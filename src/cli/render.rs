@@ -13,8 +13,8 @@ use crate::cli::score_args::ScoreArgs;
 use crate::cli::shared_args::{whole, within};
 use crate::output::NewFile;
 use crate::wav::{BEGINNING_S, Depth, Levels, WavFile};
-use chalumeau_core::instrument::Probe;
 use chalumeau_core::instrument::side_by_side::{self, Stand};
+use chalumeau_core::instrument::{BreathResponse, Probe};
 use chalumeau_core::reed::physical::P_REF_PA;
 use clap::{Args, ValueEnum};
 use indicatif::ProgressBar;
@@ -278,8 +278,12 @@ fn is_held_beyond(job: &RenderJob, seconds: f64) -> bool {
 /// How it was played, for the lines under a figure's title.
 pub fn about(prepared: &RenderJob) -> Vec<String> {
     let RenderJob { model, settings, score, rate, .. } = prepared;
+    let by_the_lip = match settings.breath_response {
+        BreathResponse::Played => "; the lip changes both with the dynamic",
+        BreathResponse::Physical => "",
+    };
     vec![format!(
-        "{}; {:.2} s at {rate} Hz, A4 = {} Hz, zeta {}, the reed shuts at {:.2} kPa",
+        "{}; {:.2} s at {rate} Hz, A4 = {} Hz, zeta {}, the reed shuts at {:.2} kPa{by_the_lip}",
         model.file.name,
         score.seconds(*rate),
         settings.a4_hz,
@@ -315,6 +319,11 @@ impl ProbeTable {
             prepared.settings.zeta,
             prepared.model.air.z_c(prepared.model.file.nominal_radius_m)
         ))?;
+        if prepared.settings.breath_response == BreathResponse::Played {
+            table.comment(format_args!(
+                "these are the reed's own; the player's lip changes closing pressure and zeta with the dynamic. gamma is over the pressure above"
+            ))?;
+        }
         Ok(Self {
             table,
             every: u64::from(render.probe_every),

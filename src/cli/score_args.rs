@@ -12,7 +12,6 @@ use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
 use crate::cli::silent_keys::{hidden_in_chords, silent_notes};
-use crate::cli::threshold::linear_threshold;
 use crate::controllers::{ControllerMap, as_links};
 use crate::presets::{self, Preset};
 use crate::scale_file;
@@ -22,14 +21,15 @@ use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::control::parts::Unplayed;
 use chalumeau_core::event::{PartEvent, Timed};
-use chalumeau_core::haptics::FeelDesign;
+use chalumeau_core::haptics::{FeelDesign, RequirementSolver};
+use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::instrument::key_pitches::{KeyPitches, TRIM_MOST_CENTS};
 use chalumeau_core::instrument::{BreathResponse, Model, Players, Settings, Split};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::midi_file;
 use chalumeau_core::score::midi_file::Tracks;
-use chalumeau_core::units::{SoundingNote, WrittenNote};
+use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
@@ -44,8 +44,10 @@ pub use breath_args::{BreathSource, GAMMA_DEFAULT};
 use given::score_of;
 pub use given::{Given, TimedNote};
 
-/// A reed with inertia begins up to a fifth below the threshold of one without (`chalumeau threshold --help`).
-const INERTIA_LEAST: f64 = 0.8;
+/// Least and greatest length of a note, s.
+const NOTE_S: (f64, f64) = (0.01, 3600.0);
+/// The waveguide that is played may begin so much below the threshold of the transfer-matrix model.
+const MODELS_APART: f64 = 0.98;
 /// Gamma at which every note of a clarinet has begun, also under a firm lip (`chalumeau threshold --zeta 0.15`: 0.54 at most, less a fifth).
 const ALL_BEGIN: f64 = 0.5;
 
@@ -84,8 +86,8 @@ pub struct ScoreArgs {
     /// Slur the scale instead of tonguing each note
     #[arg(long, requires = "scale", conflicts_with_all = ["midi", "written", "sounding"])]
     slurred: bool,
-    /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, scale 0.5]
-    #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, 0.01, 3600.0))]
+    /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, with --replay the take's; scale 0.5]
+    #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, NOTE_S.0, NOTE_S.1))]
     seconds: Option<f64>,
     /// Time to fade after the last event, s, 0..60 [default: 1, one note 0; more with a fall or a breath in]
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 60.0))]
@@ -195,11 +197,12 @@ impl ScoreArgs {
         warnings.extend(self.scale.and_then(|ends| left_out_of_scale(ends, &file)));
         let trims = self.trims(&file)?;
         let keys = self.scl.as_ref().map(|scl| scale_file::read(scl, self.kbm.as_deref())).transpose()?;
-        let (mut parts, unplayed) = self.score(&file, &map, keys.as_ref(), &mut settings)?;
+        let take = self.breath.take()?;
+        let take_s = take.as_ref().map(Take::seconds);
+        let (mut parts, unplayed) = self.score(&file, &map, keys.as_ref(), &mut settings, take_s)?;
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);
         }
-        let take = self.breath.take()?;
         let has_controllers = self.midi.is_some() && !matches!(self.given, Some(Given::Notes(_)));
         // Links of a device may move anything.
         let idle = match self.controllers {
@@ -297,8 +300,14 @@ impl ScoreArgs {
         if settings.breath_response != BreathResponse::Physical {
             return None;
         }
-        let begin = |note| linear_threshold(&file, WrittenNote(note), &settings).map(|gamma| (note, gamma));
-        let mut late = notes.filter_map(begin).filter(|&(_, gamma)| reaches < INERTIA_LEAST * gamma);
+        let a4_hz = f64::from(settings.a4_hz);
+        let bore = RequirementSolver::new(&file, Air::at(f64::from(settings.temperature_c)), a4_hz).ok()?;
+        let reed = played_reed(&file, a4_hz, &settings);
+        let begin = |note: u8| {
+            let fingering = bore.written().position(|written| written == WrittenNote(note))?;
+            Some((note, bore.note(fingering, &reed)?.gamma_sounding))
+        };
+        let mut late = notes.filter_map(begin).filter(|&(_, gamma)| reaches < MODELS_APART * gamma);
         let (note, gamma) = late.next()?;
         let others = late.count();
         let others = if others > 0 { format!(" (and {others} more)") } else { String::new() };
@@ -379,6 +388,7 @@ impl ScoreArgs {
         map: &ControllerMap,
         keys: Option<&KeyPitches>,
         settings: &mut Settings,
+        take_s: Option<f64>,
     ) -> Result<(Score<PartEvent>, Unplayed), Failure> {
         let links = as_links(&map.links, settings);
         let transposition = file.transposition;
@@ -446,7 +456,7 @@ impl ScoreArgs {
             let scale = Score::one_after_another(&notes, transposition, seconds, self.slurred, self.rate)?;
             return Ok(((&scale).into(), [0; 128]));
         }
-        let seconds = self.seconds.unwrap_or(2.0);
+        let seconds = self.seconds.or(take_s.map(|take_s| take_s.clamp(NOTE_S.0, NOTE_S.1))).unwrap_or(2.0);
         let sounding = match (self.written.map(WrittenNote), self.sounding.map(SoundingNote)) {
             (Some(written), _) => {
                 check_fingering(file, written)?;

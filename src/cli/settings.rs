@@ -180,14 +180,15 @@ fn breath_response(text: &str) -> Result<Given, String> {
 fn assignment(text: &str) -> Result<Given, String> {
     let (id, value) = text.split_once('=').ok_or("must be id=value, for example vent=2")?;
     let id = id.trim();
-    let known = parameters::find(id);
+    let named = |parameter: &&Parameter| parameter.name.eq_ignore_ascii_case(id);
+    let known = parameters::find(id).or_else(|| PARAMETERS.iter().find(named));
     if let Some(parameter) = known.filter(|parameter| parameter.sets.is_some()) {
         doubtful(id, parameter, value)?;
         let typed = format!("--set {id}");
         return Ok(Given { parameter, value: parameter.read(value)?, typed });
     }
     Err(match known {
-        Some(Parameter { name, flag: "", .. }) if OF_THE_DECODER.contains(&id) => format!(
+        Some(Parameter { id, name, flag: "", .. }) if OF_THE_DECODER.contains(id) => format!(
             "{id} ({name}) belongs to a controller; for a MIDI file, [parameters] of a --controllers file sets it"
         ),
         Some(Parameter { name, flag: "", .. }) => format!("{id} ({name}) is only in the plugin"),
@@ -197,10 +198,11 @@ fn assignment(text: &str) -> Result<Given, String> {
             let near = nearest(id, all().flat_map(|parameter| [parameter.id, parameter.name]));
             let near = all()
                 .find(|parameter| near.is_some_and(|near| [parameter.id, parameter.name].contains(&near)));
-            let near = near.map_or_else(String::new, |Parameter { id, name, .. }| {
-                format!("; did you mean {id} ({name})?")
-            });
-            format!("no parameter {id:?}{near}; `chalumeau parameters` lists them")
+            let near = near.map_or_else(
+                || ";".to_owned(),
+                |Parameter { id, name, .. }| format!(": did you mean {id} ({name})?"),
+            );
+            format!("no parameter {id:?}{near} `chalumeau parameters` lists them")
         }
     })
 }

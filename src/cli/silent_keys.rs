@@ -54,7 +54,7 @@ pub fn hidden_in_chords(events: &[Timed<PartEvent>], model: &Model, reach: Reach
     hidden += hands.iter().map(|hand| hand.unheard.len()).sum::<usize>();
     (hidden > 0).then(|| {
         format!(
-            "{} never heard: another begins in the same moment and lasts as long. A clarinet plays one note at a time, of a chord the last in the file",
+            "{} never heard: another begins in the same moment and lasts as long. A clarinet plays one note at a time, of a chord the last in the file; --players 2 or more play chords",
             if hidden == 1 { "1 note is".to_owned() } else { format!("{hidden} notes are") }
         )
     })
@@ -92,6 +92,9 @@ impl Hand {
     }
 }
 
+/// As many notes are named.
+const NAMED: usize = 6;
+
 /// Says which of these keys the instrument cannot play, which stay silent.
 pub fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -> Vec<String> {
     let file = &model.file;
@@ -114,9 +117,10 @@ pub fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -> Vec<S
     if count > 0 {
         let (low, high) = (file.lowest(), file.highest());
         said.push(format!(
-            "{} no fingering and {} silent; this instrument sounds {} to {} (written {low} to {high}){}",
+            "{} no fingering and {} silent{}; this instrument sounds {} to {} (written {low} to {high}){}",
             if count == 1 { "1 note has".to_owned() } else { format!("{count} notes have") },
             if count == 1 { "stays" } else { "stay" },
+            names_of(&missing),
             sounds(low),
             sounds(high),
             if nowhere == 0 { who_has(&missing) } else { String::new() }
@@ -143,5 +147,18 @@ fn who_has(notes: &[SoundingNote]) -> String {
         notes.iter().all(|note| fingering(note).is_some())
     };
     let found = Bundled::ALL.iter().find(has);
-    found.map(|instrument| format!("; --instrument {} has them", instrument.id())).unwrap_or_default()
+    found.map_or_else(
+        || "; --set beyond=octave plays them in the nearest octave that it has".to_owned(),
+        |instrument| format!("; --instrument {} has them", instrument.id()),
+    )
+}
+
+/// The names of some notes, in brackets, as they sound.
+fn names_of(notes: &[SoundingNote]) -> String {
+    let notes: BTreeSet<_> = notes.iter().collect();
+    let named: Vec<_> = notes.iter().take(NAMED).map(ToString::to_string).collect();
+    match notes.len() {
+        0 => String::new(),
+        count => format!(" ({}{})", named.join(", "), if count > NAMED { ", ..." } else { "" }),
+    }
 }

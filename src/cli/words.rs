@@ -49,9 +49,34 @@ pub fn advised(mut error: clap::Error, command: &Command) -> clap::Error {
         let advice = format!("{how} sets {name}; `chalumeau parameters` lists what can be set");
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
+    } else if let Some(flag) = unknown.filter(|_| error.kind() == ErrorKind::UnknownArgument) {
+        let wanted = flag.trim_start_matches('-');
+        let meant = MEANT.iter().find(|(word, known, _)| *word == wanted && has(known));
+        let is_far = |near: &str| {
+            let near = near.trim_start_matches('-');
+            !near.starts_with(wanted) && 3 * strsim::osa_distance(near, wanted) > wanted.chars().count()
+        };
+        match (meant, error.get(ContextKind::SuggestedArg)) {
+            (Some((_, _, advice)), _) => {
+                error.remove(ContextKind::SuggestedArg);
+                error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![(*advice).into()]));
+            }
+            // Farther away, it is another word.
+            (None, Some(ContextValue::String(near))) if is_far(near) => {
+                error.remove(ContextKind::SuggestedArg);
+            }
+            _ => {}
+        }
     }
     error
 }
+
+/// Words that others use: for which flag, and what to say.
+const MEANT: [(&str, &str, &str); 3] = [
+    ("note", "written", "'--written' takes a note as the player reads it, '--sounding' as it sounds"),
+    ("velocity", "dynamic", "'--dynamic' sets how loud a note is"),
+    ("reverb", "set", "'--set room=<VALUE>' sets Room"),
+];
 
 /// The names that a command knows.
 pub struct Names {

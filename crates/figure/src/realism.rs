@@ -65,22 +65,32 @@ pub fn figure(title: &str, notes: &[String], right: (f64, f64), dynamics: &[Comp
         let name = format!("{} (mean {:.1} dB)", dynamic.name, dynamic.error_db);
         let errors = over(|note| note.error_db);
         error = error
-            .with(Line::new(name, errors.clone()).colour(colour).dash(dash))
+            .with(Line::new(name, means(&errors)).colour(colour).dash(dash))
             .with(Points::new("", errors).colour(colour).shape(shape));
         let ratios = over(|note| note.centroid_ratio.unwrap_or(f64::NAN));
         centroid = centroid
-            .with(Line::new(dynamic.name.clone(), ratios.clone()).colour(colour).dash(dash))
+            .with(Line::new(dynamic.name.clone(), means(&ratios)).colour(colour).dash(dash))
             .with(Points::new("", ratios).colour(colour).shape(shape));
         let levels = over(|note| note.level_db.unwrap_or(f64::NAN));
-        let recorded = over(|note| note.recorded_level_db).into_iter().map(|(x, y)| (x, y + offset));
+        let recorded = means(&over(|note| note.recorded_level_db)).into_iter().map(|(x, y)| (x, y + offset));
         level = level
-            .with(Line::new(dynamic.name.clone(), levels).colour(colour).dash(dash))
+            .with(Line::new(dynamic.name.clone(), means(&levels)).colour(colour).dash(dash))
             .with(Points::new("", recorded).colour(colour).shape(Shape::Ring));
         let differences = (1..).map(f64::from).zip(dynamic.differences_db.iter().copied());
         harmonics = harmonics.with(Line::new(dynamic.name.clone(), differences).colour(colour).dash(dash));
     }
     let figure = Figure::new(title).columns(2).panel(error).panel(centroid).panel(level).panel(harmonics);
     notes.iter().fold(figure, |figure, note| figure.note(note.clone()))
+}
+
+/// The mean of the takes of each note, which follow each other; NaN where all failed.
+fn means(takes: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mean = |takes: &[(f64, f64)]| {
+        let heard: Vec<f64> =
+            takes.iter().map(|(_, value)| *value).filter(|value| value.is_finite()).collect();
+        (takes[0].0, heard.iter().sum::<f64>() / heard.len() as f64)
+    };
+    takes.chunk_by(|a, b| a.0 == b.0).map(mean).collect()
 }
 
 #[cfg(test)]
@@ -108,6 +118,10 @@ mod tests {
         let layers = &figure.panels[2].layers;
         let Layer::Line(played) = &layers[0] else { panic!() };
         assert_eq!(played.pieces, [vec![[60.0, -20.0]], vec![[64.0, -22.0]]]);
+        assert_eq!(
+            means(&[(60.0, 1.0), (60.0, 3.0), (61.0, f64::NAN), (61.0, 5.0)]),
+            [(60.0, 2.0), (61.0, 5.0)]
+        );
         let Layer::Points(recorded) = &layers[1] else { panic!() };
         assert_eq!(recorded.points, [[60.0, -21.0], [62.0, -21.0], [64.0, -21.0]]);
     }

@@ -5,9 +5,13 @@ use crate::pitch_line;
 use crate::{Axis, Dash, Figure, Line, Panel, Points, Shape};
 use chalumeau_core::analysis::pitch::{TrackPoint, WINDOW_S};
 use chalumeau_core::analysis::recording::Note;
+use chalumeau_core::analysis::spectrum::HARMONICS;
 
 /// Softer moments have no level worth drawing, dB re the loudest: 15 dB below the softest notes.
 const SOFT_DB: f64 = -60.0;
+/// Free room above and below the notes, semitones, and what is shown where there are none: the octave from middle C.
+const AROUND: f64 = 1.5;
+const NO_NOTES: (f64, f64) = (60.0, 72.0);
 /// As many notes have harmonics of their own; of more, the mean is drawn.
 const MOST: usize = 6;
 
@@ -39,10 +43,13 @@ pub fn figure(
         let at = key(note.f0_hz);
         [(from_s + note.start_s, at), (from_s + note.end_s, at), (from_s + note.end_s, f64::NAN)]
     });
+    let keys = notes.iter().map(|note| key(note.f0_hz));
+    let (low, high) = keys.fold((f64::MAX, f64::MIN), |(low, high), key| (low.min(key), high.max(key)));
+    let (low, high) = if low > high { NO_NOTES } else { (low, high) };
     // Both panels over the same time, half a window beyond the last moment.
     let end_s = track.last().map_or(WINDOW_S, |point| point.t_s + 0.5 * WINDOW_S);
     let time = || Axis::linear("time, s").range(from_s, from_s + end_s);
-    let pitch = Panel::new("Pitch", time(), Axis::notes("sounding note"))
+    let pitch = Panel::new("Pitch", time(), Axis::notes("sounding note").range(low - AROUND, high + AROUND))
         .with(Line::new("mean of each note", held).colour(Colour::Sky).width(6.0))
         .with(Line::new("every 10 ms", played).colour(Colour::Ink).width(1.5));
     let in_db = |rms: f64| 20.0 * rms.log10();
@@ -64,6 +71,7 @@ pub fn figure(
 /// Levels of the harmonics of a few notes, or their mean.
 fn harmonics(notes: &[Note], names: &[String], from_s: f64) -> Panel {
     let axis = || Axis::linear("dB re the strongest");
+    let number = || Axis::linear("harmonic").range(0.5, HARMONICS as f64 + 0.5);
     if notes.len() > MOST {
         let most = notes.iter().map(|note| note.levels_db.len()).max().unwrap_or(0);
         let mean = (0..most).map(|index| {
@@ -73,11 +81,11 @@ fn harmonics(notes: &[Note], names: &[String], from_s: f64) -> Panel {
         });
         let mean: Vec<_> = mean.collect();
         let title = format!("Harmonics, mean of {} notes", notes.len());
-        return Panel::new(title, Axis::linear("harmonic"), axis())
+        return Panel::new(title, number(), axis())
             .with(Line::new("", mean.clone()).colour(Colour::Blue))
             .with(Points::new("", mean).colour(Colour::Blue));
     }
-    let mut panel = Panel::new("Harmonics", Axis::linear("harmonic"), axis());
+    let mut panel = Panel::new("Harmonics", number(), axis());
     for ((note, name), (colour, dash, shape)) in notes.iter().zip(names).zip(LOOKS) {
         let levels: Vec<_> = (1..).map(f64::from).zip(note.levels_db.iter().copied()).collect();
         let name = format!("{name} at {:.1} s", from_s + note.start_s);

@@ -96,6 +96,21 @@ impl Values {
     }
 }
 
+/// Fails if a name is none, or stands twice.
+fn check_names(all: &[String]) -> Result<(), String> {
+    let names = Names::of::<RenderCommand>();
+    for (at, name) in all.iter().enumerate() {
+        if all[..at].contains(name) {
+            return Err(format!("{name} stands twice; give each name once"));
+        }
+        if OWN.contains(&name.as_str()) {
+            return Err(format!("{name} cannot be in a plan: the batch names the files itself"));
+        }
+        names.check(name)?;
+    }
+    Ok(())
+}
+
 impl Plan {
     /// Reads a plan. What is wrong is said without the name of the file.
     pub fn read(path: &Path) -> Result<Self, String> {
@@ -113,6 +128,8 @@ impl Plan {
         if vary.is_empty() {
             return Err("nothing varies: [vary] is empty".to_owned());
         }
+        // A wrong name is said before its values are read.
+        check_names(&same.keys().chain(vary.keys()).cloned().collect::<Vec<_>>())?;
         let (mut names, mut one) = (Vec::new(), Vec::new());
         for (name, value) in same {
             let scalar: Scalar = value.try_into().map_err(|_| {
@@ -170,16 +187,7 @@ impl Plan {
 
     /// Fails if a name is none.
     fn checked(self) -> Result<Self, String> {
-        let names = Names::of::<RenderCommand>();
-        for (at, name) in self.names.iter().enumerate() {
-            if self.names[..at].contains(name) {
-                return Err(format!("{name} stands twice; give each name once"));
-            }
-            if OWN.contains(&name.as_str()) {
-                return Err(format!("{name} cannot be in a plan: the batch names the files itself"));
-            }
-            names.check(name)?;
-        }
+        check_names(&self.names)?;
         Ok(self)
     }
 

@@ -264,7 +264,8 @@ impl Part {
         };
         let (from, levels) = level(head_s.max(after_s), self.from_s + EDGE_S.0);
         let start = from + levels.iter().position(|level| *level >= first).unwrap_or(0);
-        let (from, levels) = level(self.to_s - EDGE_S.0, tail_s.min(before_s.max(self.to_s)));
+        // What rings on may have a pitch long after the note has ended.
+        let (from, levels) = level(self.from_s, tail_s.min(before_s.max(self.to_s)));
         let end = from + levels.iter().rposition(|level| *level >= last).map_or(levels.len(), |at| at + 1);
         (start as f64 / rate_hz, end.max(start) as f64 / rate_hz)
     }

@@ -133,22 +133,22 @@ impl FeelRefused {
     pub fn advice(&self) -> Option<String> {
         let advice = match *self {
             Self::Range { .. } => return None,
-            Self::Field { .. } => "lengthen the travel, or lower the strength or Place",
+            Self::Field { .. } => "lengthen the travel, or lower Feel torque or Feel place",
             Self::Reference(_) => "choose another",
             Self::Silent { .. } => "raise zeta, A or H",
             Self::Closing(_) => "a knob can follow H k up to 10",
             Self::Slip => "set k apart from H if this reed is meant",
             Self::Travel { .. } => "shorten the travel",
-            Self::Crossed { .. } => "lower Place, raise zeta, or use the flow law",
+            Self::Crossed { .. } => "lower Feel place, raise zeta, or use the flow law",
             Self::Ceiling { strength_mnm: 0.0, .. } => "lower the mark or the friction, or allow more torque",
             Self::Ceiling { strength_mnm, .. } => {
                 return Some(format!(
-                    "lower the strength to {strength_mnm:.0} mNm or less, lower Contrast, or allow more torque"
+                    "lower Feel torque to {strength_mnm:.0} mNm or less, lower Feel contrast, or allow more torque"
                 ));
             }
-            Self::Stiffness { .. } => "lower the strength, soften the wall, or lengthen the travel",
+            Self::Stiffness { .. } => "lower Feel torque, soften the wall, or lengthen the travel",
             Self::Push { .. } => {
-                "lower the mark or the strength, lengthen the travel, or use the pressure law"
+                "lower the mark or Feel torque, lengthen the travel, or use the pressure law"
             }
         };
         Some(advice.to_owned())

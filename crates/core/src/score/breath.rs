@@ -21,6 +21,8 @@ const POINTS_MAX: usize = 3_600_000;
 const STEP_S: f64 = 0.001;
 /// Longest ramp: a day, s.
 const LONGEST_S: f64 = 86_400.0;
+/// Most characters of a file that an error shows.
+const SHOWN: usize = 60;
 
 /// Why a breath curve was refused. Lines are counted from 1; the messages say what would be right.
 #[derive(Debug, thiserror::Error)]
@@ -217,18 +219,18 @@ impl BreathCurve {
             }
             let fields: Vec<&str> = text.split(',').map(str::trim).collect();
             let &[t, g] = fields.as_slice() else {
-                return Err(BreathError::Columns { line, given: text.to_owned() });
+                return Err(BreathError::Columns { line, given: shown(text) });
             };
             if std::mem::take(&mut first) {
                 if (t, g) == ("t_s", "gamma") {
                     continue;
                 }
                 if [t, g].iter().all(|field| field.parse::<f64>().is_err()) {
-                    return Err(BreathError::Header { line, given: text.to_owned() });
+                    return Err(BreathError::Header { line, given: shown(text) });
                 }
             }
             let number = |given: &str, column| {
-                let refused = || BreathError::Number { line, column, given: given.to_owned() };
+                let refused = || BreathError::Number { line, column, given: shown(given) };
                 given.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(refused)
             };
             let (t, g) = (number(t, "t_s")?, number(g, "gamma")? as f32);
@@ -285,6 +287,12 @@ impl BreathCurve {
         }
         events
     }
+}
+
+/// A text as an error shows it: of a long one, such as that of a file that is no table, the beginning.
+fn shown(text: &str) -> String {
+    let kept: String = text.chars().take(SHOWN).collect();
+    if kept.len() < text.len() { kept + "..." } else { kept }
 }
 
 #[cfg(test)]
