@@ -530,12 +530,13 @@ mod tests {
         for (words, says) in [
             (
                 &["--set", "vnt=2"][..],
-                &["no parameter \"vnt\"; did you mean vent (Register vent)?", "chalumeau parameters"][..],
+                &["no parameter \"vnt\": did you mean vent (Register vent)?", "chalumeau parameters"][..],
             ),
             (&["--set", "strength=3"], &["did you mean stren (Reed strength)?"]),
             (&["--set", "bfrom=keys"], &["bfrom (Breath from) belongs to a controller", "--controllers"]),
             (&["--set", "vent"], &["must be id=value"]),
             (&["--set", "vent=9"], &["vent (Register vent) must lie in 0..4, got 9"]),
+            (&["--set", "register vent=9"], &["must lie in 0..4, got 9"]),
             (&["--set", "temp=50 °C"], &["temp (Temperature) must lie in 10..40 °C"]),
             (&["--set", "tune=just"], &["must be one of Natural, Tempered"]),
             (&["--set", "instr=bass"], &["instr (Instrument)", "the flag is --instrument"]),

@@ -238,9 +238,12 @@ fn mistakes_are_explained() {
         ("--osc nowhere", "no HOST:PORT"),
         ("--misspelt", "--osc"),
         ("--serial-number 0", "hexadecimal"),
-        ("--log no/such/folder/x.csv", "cannot write no/such/folder/x.csv"),
+        ("--log no/such/folder/x.csv", "directory no/such/folder does not exist"),
+        ("--log kept.csv", "exists already"),
     ] {
         let directory = tempfile::tempdir().unwrap();
+        let kept = directory.path().join("kept.csv");
+        std::fs::write(&kept, "mine").unwrap();
         let output = Command::new(env!("CARGO_BIN_EXE_chalumeau"))
             .args(["knob-sim", "--seconds", "0"])
             .args(arguments.split_whitespace())
@@ -251,6 +254,7 @@ fn mistakes_are_explained() {
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
         assert!(said.contains(says) && !said.contains("panicked"), "{arguments}: {said}");
+        assert_eq!(std::fs::read_to_string(&kept).unwrap(), "mine", "{arguments}");
     }
 }
 

@@ -174,10 +174,11 @@ mod tests {
         assert_eq!(instruments.len(), Bundled::ALL.len());
         for instrument in instruments {
             let fingerings = instrument["fingerings"].as_array().unwrap();
-            assert!(fingerings.len() > 40 && instrument["holes"].as_array().unwrap().len() == 24);
+            let holes = instrument["holes"].as_array().unwrap().len();
+            assert!(fingerings.len() > 40 && holes >= 24);
             for fingering in fingerings {
                 assert_eq!(fingering["wave"].as_str().unwrap().len(), 2 * PLACES);
-                assert_eq!(fingering["open"].as_str().unwrap().len(), 24);
+                assert_eq!(fingering["open"].as_str().unwrap().len(), holes);
             }
         }
         let presets = all["presets"].as_array().unwrap();
