@@ -422,7 +422,7 @@ impl Chalumeau {
         inputs.wheel(self.params.expression.wheel.value().into(), drives);
         inputs.key_switches(settings.reach.key_switches);
         let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
-        keys.into_iter().flatten().for_each(|event| inputs.window_key(event, settings.reach.key_switches));
+        keys.into_iter().flatten().for_each(|event| inputs.window_key(event));
         drives
     }
 

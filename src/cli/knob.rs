@@ -420,8 +420,9 @@ fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, said: &mut String
     {
         words = format!("{words}; {more}");
     }
-    if words.ends_with("arm again") {
-        words.push_str(": end with Ctrl-C, and start the same command");
+    // There is no second ARM here.
+    if status.last_refusal.is_some() {
+        words.push_str("; to arm again, end with Ctrl-C and start the same command");
     }
     if words != *said {
         let fresh = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };

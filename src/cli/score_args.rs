@@ -283,8 +283,8 @@ impl ScoreArgs {
         self.preset.as_ref().map(Preset::to_text)
     }
 
-    /// Says which notes of the command line begin above all that a curve of gamma reaches. Takes some 30 ms for each note, so a batch
-    /// does not ask.
+    /// Says which notes of the command line begin above all that a curve of gamma reaches. Works out the whole bore, so a batch does not
+    /// ask.
     pub fn too_little_breath(&self) -> Option<String> {
         let curve = self.breath.curve(self.midi.is_some()).ok()??;
         let reaches = f64::from(curve.gamma_max());

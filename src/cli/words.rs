@@ -54,14 +54,13 @@ pub fn advised(mut error: clap::Error, command: &Command) -> clap::Error {
         let meant = MEANT.iter().find(|(word, known, _)| *word == wanted && has(known));
         let is_far = |near: &str| {
             let near = near.trim_start_matches('-');
-            !near.starts_with(wanted) && 3 * strsim::osa_distance(near, wanted) > wanted.chars().count()
+            !near.starts_with(wanted) && !is_like(near, wanted)
         };
         match (meant, error.get(ContextKind::SuggestedArg)) {
             (Some((_, _, advice)), _) => {
                 error.remove(ContextKind::SuggestedArg);
                 error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![(*advice).into()]));
             }
-            // Farther away, it is another word.
             (None, Some(ContextValue::String(near))) if is_far(near) => {
                 error.remove(ContextKind::SuggestedArg);
             }
@@ -69,6 +68,11 @@ pub fn advised(mut error: clap::Error, command: &Command) -> clap::Error {
         }
     }
     error
+}
+
+/// Whether `name` may be a slip for a known one. Farther away, it is another word.
+fn is_like(known: &str, name: &str) -> bool {
+    3 * strsim::osa_distance(known, name) <= name.chars().count()
 }
 
 /// Words that others use: for which flag, and what to say.
@@ -104,10 +108,8 @@ impl Names {
         let all = known.join(", ");
         let begin: Vec<_> = known.iter().copied().filter(|known| known.starts_with(name)).collect();
         let near = if name.is_empty() || begin.is_empty() {
-            let distance = |known: &&str| strsim::osa_distance(known, name);
-            let nearest = known.into_iter().min_by_key(distance);
-            // Farther away, it is another word.
-            nearest.filter(|near| 3 * distance(near) <= name.chars().count()).map(str::to_owned)
+            let nearest = known.into_iter().min_by_key(|known| strsim::osa_distance(known, name));
+            nearest.filter(|near| is_like(near, name)).map(str::to_owned)
         } else {
             Some(one_of(&begin))
         };

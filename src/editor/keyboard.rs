@@ -20,7 +20,7 @@ use chalumeau_core::units::SoundingNote;
 use switch_row::SwitchRow;
 use typed_letters::TypedLetters;
 
-/// Velocity of a note played with Space or a letter.
+/// Velocity of a note played with Space, and of a letter at first.
 const PLAIN: f32 = 0.75;
 /// Velocity of a key that is pressed at its upper edge.
 const SOFTEST: f32 = 0.05;

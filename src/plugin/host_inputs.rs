@@ -97,29 +97,20 @@ impl HostInputs {
         push(&mut self.events, event);
     }
 
-    /// What the keys of the window say. They play chords as the host's keys do; all else is for the first player, which the window
-    /// shows.
-    pub fn window_key(&mut self, event: Event, key_switches: KeySwitches) {
+    /// What the window says. Its keys play as the host's do; all else is for the first player, which it shows.
+    pub fn window_key(&mut self, event: Event) {
         match event {
             Event::Breath(unit) => self.breath_sources().blow(BreathInput::Parameter, unit),
             Event::NoteOn { velocity, .. } => self.breath_sources().key(velocity),
             _ => {}
         }
-        let chosen = match event {
-            Event::NoteOn { note, .. } => key_switches.chosen(note.0),
-            _ => None,
-        };
-        if let Some(fingerings) = chosen {
-            self.say(Event::Fingerings(fingerings).into());
-        } else if self.translator.parts() > 1 && matches!(event, Event::NoteOn { .. } | Event::NoteOff { .. })
-        {
-            for &event in self.translator.window_note(&event) {
-                push(&mut self.events, event);
-            }
-            self.note_ends(0);
-        } else {
-            self.say(PartEvent { to: To::Player(0), event });
+        let from = self.events.len();
+        match self.translator.window_note(&event) {
+            Some(said) => said.iter().for_each(|&event| push(&mut self.events, event)),
+            None => return self.say(PartEvent { to: To::Player(0), event }),
         }
+        self.shape_breath(from);
+        self.note_ends(0);
     }
 
     /// The latest MIDI program change, 0..=127, once.
@@ -230,12 +221,7 @@ impl HostInputs {
         for &event in self.translator.translate(&event, reeds.is_some()) {
             push(&mut self.events, event);
         }
-        for event in &mut self.events {
-            if let (Event::Breath(unit), Some(origin)) = (event.event, self.translator.breath_origin()) {
-                self.breath_sources.blow(origin.into(), unit);
-                event.event = Event::Breath(self.curves.breath(origin, unit));
-            }
-        }
+        self.shape_breath(0);
         self.note_ends(event.timing());
         let is_snapshot = channel.is_some_and(|channel| self.translator.is_snapshot(channel));
         match reeds {
@@ -246,6 +232,17 @@ impl HostInputs {
         self.reeds.follow(matches!(event, NoteEvent::NoteOn { .. }), &self.translator);
         for event in self.reeds.changed(drives, self.translator.parts()) {
             push(&mut self.events, event);
+        }
+    }
+
+    /// Names the source of what blows, from this event on, and gives it the curve of its source.
+    fn shape_breath(&mut self, from: usize) {
+        let Some(origin) = self.translator.breath_origin() else { return };
+        for event in &mut self.events[from..] {
+            if let Event::Breath(unit) = event.event {
+                self.breath_sources.blow(origin.into(), unit);
+                event.event = Event::Breath(self.curves.breath(origin, unit));
+            }
         }
     }
 
@@ -396,9 +393,8 @@ mod tests {
         let mut inputs = HostInputs::default();
         inputs.begin_block(3);
         let keys = [60, 64, 67].map(SoundingNote);
-        let switches = KeySwitches::default();
         for note in keys {
-            inputs.window_key(Event::NoteOn { note, velocity: 0.5 }, switches);
+            inputs.window_key(Event::NoteOn { note, velocity: 0.5 });
         }
         let links = ControllerLinks::default();
         let mut begun = Vec::new();
@@ -410,10 +406,24 @@ mod tests {
         assert_eq!(begun, [0, 1, 2].map(|part| (To::Player(part), keys[usize::from(part)])));
         inputs.begin_block(3);
         for note in keys {
-            inputs.window_key(Event::NoteOff { note }, switches);
+            inputs.window_key(Event::NoteOff { note });
         }
         inputs.fall_silent(0, |_| true);
         assert_eq!(inputs.ended(), []);
+    }
+
+    #[test]
+    fn a_key_of_the_window_comes_up_whatever_becomes_of_the_players_meanwhile() {
+        let note = SoundingNote(60);
+        for (at_first, then) in [(1, 3), (3, 1), (1, 1)] {
+            let mut inputs = HostInputs::default();
+            inputs.begin_block(at_first);
+            inputs.window_key(Event::NoteOn { note, velocity: 0.5 });
+            inputs.begin_block(then);
+            inputs.window_key(Event::NoteOff { note });
+            let said: Vec<Event> = inputs.events.iter().map(|event| event.event).collect();
+            assert_eq!(said, [Event::NoteOff { note }], "{at_first} players, then {then}");
+        }
     }
 
     #[test]

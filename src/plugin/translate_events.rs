@@ -69,17 +69,18 @@ impl EventTranslator {
         }
     }
 
-    /// The events of a key of the window, which has no channel.
-    pub fn window_note(&mut self, event: &Event) -> &[PartEvent] {
+    /// The events of a key of the window, which counts as on the first channel; `None` for what is no key.
+    pub fn window_note(&mut self, event: &Event) -> Option<&[PartEvent]> {
         match *event {
             Event::NoteOn { note, velocity } => {
                 let note = Note { id: WINDOW_NOTE, channel: 0, key: note.0 };
-                self.midi.strike(note, raw7(velocity).max(1))
+                Some(self.midi.strike(note, raw7(velocity).max(1)))
             }
             Event::NoteOff { note } => {
-                self.midi.release(NoteAddress { id: WINDOW_NOTE, channel: Some(0), key: Some(note.0) })
+                let address = NoteAddress { id: WINDOW_NOTE, channel: Some(0), key: Some(note.0) };
+                Some(self.midi.release(address))
             }
-            _ => &[],
+            _ => None,
         }
     }
 

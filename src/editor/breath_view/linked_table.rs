@@ -11,26 +11,23 @@ use crate::parameters::{Kind, Parameter};
 /// Of the list of devices, points: all of them at once.
 const LIST_HEIGHT: f32 = 320.0;
 
-/// Whether links and parameters are as this device needs them.
-fn is_set(hands: &Hands, map: &ControllerMap) -> bool {
+/// Whether parameters and these links are as a device needs them.
+fn is_set(hands: &Hands, links: &[ParameterLink], map: &ControllerMap) -> bool {
     let near = |parameter: &Parameter, value| {
         let look = hands.controls.look(parameter.id);
         look.is_none_or(|look| (look.value - parameter.normalized(value)).abs() < 1e-4)
     };
-    let links = hands.controls.links().map(|links| links.all());
-    links.is_some_and(|all| all.iter().map(|(link, _)| link).eq(&map.links))
-        && factory::values(map).into_iter().all(|(parameter, value)| near(parameter, value))
+    links == map.links && factory::values(map).into_iter().all(|(parameter, value)| near(parameter, value))
 }
 
 /// A list of devices; the one that is chosen replaces all links, and sets what devices need.
 pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
-    if hands.controls.links().is_none() {
-        return;
-    }
+    let Some(links) = hands.controls.links() else { return };
+    let all: Vec<ParameterLink> = links.all().into_iter().map(|(link, _)| link).collect();
     let c = Colours::here(ui);
     heading(ui, "Device");
     let list = egui::ComboBox::from_id_salt("controllers of a device").width(ui.available_width() - 8.0);
-    let now = factory::all().iter().find(|map| is_set(hands, map));
+    let now = factory::all().iter().find(|map| is_set(hands, &all, map));
     let mut chosen = None;
     let text = now.map_or("Choose a device", |map| map.name.as_str());
     let response = list.height(LIST_HEIGHT).selected_text(text).show_ui(ui, |ui| {
@@ -45,7 +42,7 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
     if let Some(map) = now {
         ui.label(RichText::new(&map.shows).font(theme::small()).color(c.quiet));
     }
-    let (Some(map), Some(links)) = (chosen, hands.controls.links()) else { return };
+    let Some(map) = chosen else { return };
     links.learn(None);
     links.replace(&map.links);
     let values = factory::values(map).into_iter();

@@ -5,6 +5,7 @@
 
 use egui::{Event, Key, Ui};
 
+use super::PLAIN;
 use crate::editor::Action;
 use chalumeau_core::units::SoundingNote;
 
@@ -31,8 +32,7 @@ const LETTERS: [(Key, u8); 17] = [
 /// Where the lowest letter begins: C4.
 const FIRST: u8 = 60;
 
-/// Velocity of a letter at first, how far it goes, and by how much C and V change it: from pp to ff, as the breath of keys has it.
-const VELOCITY: f32 = 0.75;
+/// How far the velocity of letters goes, and by how much C and V change it.
 const VELOCITIES: (f32, f32) = (0.125, 1.0);
 const VELOCITY_STEP: f32 = 0.125;
 
@@ -48,7 +48,7 @@ pub struct TypedLetters {
 
 impl Default for TypedLetters {
     fn default() -> Self {
-        Self { lowest: FIRST, velocity: VELOCITY, held: Vec::new(), leaving: Vec::new() }
+        Self { lowest: FIRST, velocity: PLAIN, held: Vec::new(), leaving: Vec::new() }
     }
 }
 

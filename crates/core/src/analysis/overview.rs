@@ -4,7 +4,7 @@
 //! costs; at most three windows of samples are kept, a quarter of a second at 48 kHz. Columns of a short sound overlap, those of a long one look at
 //! one moment each: between them nothing is seen of the spectrum, but all of the outline.
 
-use crate::analysis::pitch::{LOWEST_HZ, TrackPoint, pitch_track_above, window_s};
+use crate::analysis::pitch::{LOWEST_HZ, TrackPoint, drop_longer_periods, pitch_track_above, window_s};
 use crate::analysis::spectrum::power_spectrum_db;
 use crate::units::nearest_rate_hz;
 
@@ -148,6 +148,7 @@ impl Watcher {
         let end = self.kept_from + self.kept.len();
         self.kept.resize(self.kept.len() + self.window, 0.0);
         self.advance(end.max(self.samples) + self.window);
+        drop_longer_periods(&mut self.overview.track);
         self.overview
     }
 

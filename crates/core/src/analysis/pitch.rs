@@ -11,10 +11,12 @@
 
 use crate::analysis::{BLACKMAN_HARRIS, HANN, cosine_window, is_hz, parabola, rms, without_mean};
 use crate::maths;
+use crate::units::cents;
 use chalumeau_fft as fft;
 use num_complex::Complex64;
 use std::array;
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::LazyLock;
 
 /// Lowest fundamental looked for where no other is given, Hz.
@@ -51,6 +53,11 @@ const SILENCE: f64 = 1e-12;
 
 /// Window of a [`pitch_track`], s: three periods of the lowest fundamental.
 pub const WINDOW_S: f64 = 0.06;
+
+/// A track that moves by more between two moments is at another note, cents.
+const JUMP_CENTS: f64 = 60.0;
+/// What lasts for less may be a mistake, s: a window of the track and half as much.
+const DOUBTFUL_S: f64 = 1.5 * WINDOW_S;
 
 /// One moment of a [`pitch_track`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -192,6 +199,44 @@ pub fn pitch_track_above(samples: &[f64], rate_hz: f64, hop_s: f64, least_hz: f6
             }
         })
         .collect()
+}
+
+/// Takes the pitch from what is short, beside another pitch, and an octave or a twelfth below it: where one note dies away in the next, a
+/// track finds for a moment twice or three times the period. Allocates.
+pub fn drop_longer_periods(track: &mut [TrackPoint]) {
+    let mut pieces: Vec<Range<usize>> = Vec::new();
+    for (at, point) in track.iter().enumerate() {
+        let Some(hz) = point.hz else { continue };
+        let goes_on = |piece: &&mut Range<usize>| {
+            piece.end == at && track[at - 1].hz.is_some_and(|before_hz| is_near(before_hz, hz))
+        };
+        match pieces.last_mut().filter(goes_on) {
+            Some(piece) => piece.end = at + 1,
+            None => pieces.push(at..at + 1),
+        }
+    }
+    // The moment at which two pieces meet, seen from the first of them.
+    let is_beside = |(here, there): (usize, usize)| {
+        let (here, there) = (&track[here], &track[there]);
+        let is_longer =
+            |here_hz: f64, there_hz: f64| [2.0, 3.0].iter().any(|times| is_near(times * here_hz, there_hz));
+        (here.t_s - there.t_s).abs() < DOUBTFUL_S
+            && here.hz.zip(there.hz).is_some_and(|(a, b)| is_longer(a, b))
+    };
+    let is_mistaken = |&at: &usize| {
+        let piece = &pieces[at];
+        let before = at.checked_sub(1).map(|before| (piece.start, pieces[before].end - 1));
+        let after = pieces.get(at + 1).map(|after| (piece.end - 1, after.start));
+        track[piece.end - 1].t_s - track[piece.start].t_s < DOUBTFUL_S
+            && before.into_iter().chain(after).any(is_beside)
+    };
+    for at in (0..pieces.len()).filter(is_mistaken).collect::<Vec<_>>() {
+        track[pieces[at].clone()].iter_mut().for_each(|point| point.hz = None);
+    }
+}
+
+fn is_near(hz: f64, other_hz: f64) -> bool {
+    cents(hz, other_hz).abs() <= JUMP_CENTS
 }
 
 /// The shortest of the good periods by autocorrelation.

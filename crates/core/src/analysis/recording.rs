@@ -3,7 +3,7 @@
 //! For one voice at a time. A note ends where the sound does, where the pitch moves on, or where the level dips as the tongue
 //! makes it. What two notes share (a glide, a click of the fingers) belongs to neither.
 
-use crate::analysis::pitch::{TrackPoint, pitch_track, refine_hz};
+use crate::analysis::pitch::{TrackPoint, drop_longer_periods, pitch_track, refine_hz};
 use crate::analysis::spectrum::{HARMONICS, centroid_hz, levels_of_harmonics_db, moving_rms, rms_dbfs};
 use crate::analysis::{is_hz, onset, upper_median, without_mean};
 use crate::units::cents;
@@ -21,9 +21,6 @@ const APART_CENTS: f64 = 70.0;
 const FEWEST: usize = 5;
 /// As many moments without pitch, or of another, do not end a note.
 const GAP: usize = 3;
-/// A sound of fewer moments, an octave or a twelfth below its neighbour, is that neighbour, whose period is also found twice and three
-/// times as long while another note dies away: a window of the track and half as much.
-const DOUBTFUL: usize = 9;
 /// Window of the envelope in which the tongue is looked for, s: two periods of 100 Hz.
 const ENVELOPE_S: f64 = 0.02;
 /// Distance between its values, s.
@@ -35,6 +32,8 @@ const DIP: f64 = 0.4;
 /// A note begins and ends at this share of its steady level, as in [`onset::attack_s`]; over noise, at twice the level beside it and at
 /// most at half of its own.
 const EDGE: f64 = 0.1;
+/// What is softer than this share of a note's loudest moment is not held any more: -10 dB (by judgement).
+const LOUD: f64 = 0.316;
 /// How far from its first and last moment that may be, s: half a window of the track and a hop, and what a room adds at most (by
 /// judgement).
 const EDGE_S: (f64, f64) = (0.05, 0.1);
@@ -82,14 +81,15 @@ pub fn notes(samples: &[f64], rate_hz: f64) -> (Vec<Note>, Vec<TrackPoint>) {
         return (Vec::new(), Vec::new());
     }
     let samples = &without_mean(samples);
-    let track = pitch_track(samples, rate_hz, HOP_S);
+    let mut track = pitch_track(samples, rate_hz, HOP_S);
+    drop_longer_periods(&mut track);
     let envelope = Envelope::new(samples, rate_hz);
     let loudest = track.iter().map(|point| point.rms).fold(0.0, f64::max);
     let floor = (SILENT * loudest).max(QUIET);
     let pitched = track.iter().enumerate().filter(|(_, point)| point.rms > floor);
     let pitched: Vec<_> = pitched.filter_map(|(at, point)| Some((at, point.hz?))).collect();
     let timed = |run: Run| Part { from_s: track[run.from].t_s, to_s: track[run.to].t_s, hz: run.hz };
-    let parts = without_longer_periods(runs(&pitched)).into_iter().map(timed);
+    let parts = runs(&pitched).into_iter().map(timed);
     let parts = tongued(parts, &envelope);
     let mut notes: Vec<Note> = Vec::new();
     for (at, part) in parts.iter().enumerate() {
@@ -153,27 +153,6 @@ fn runs(pitched: &[(usize, f64)]) -> Vec<Run> {
     }
     close(&pitched[first..]);
     found
-}
-
-/// The runs without those that are a longer period of a neighbour.
-fn without_longer_periods(mut runs: Vec<Run>) -> Vec<Run> {
-    let mut at = 0;
-    while let Some(&run) = runs.get(at) {
-        let is_of = |hz: f64| [2.0, 3.0].iter().any(|times| is_near(times * run.hz, hz));
-        let is_doubtful = run.moments() < DOUBTFUL;
-        let next = runs.get(at + 1).copied();
-        let before = at.checked_sub(1).map(|at| runs[at]);
-        if is_doubtful && next.is_some_and(|next| is_of(next.hz) && run.touches(&next)) {
-            runs[at + 1].from = run.from;
-        } else if is_doubtful && before.is_some_and(|before| is_of(before.hz) && before.touches(&run)) {
-            runs[at - 1].to = run.to;
-        } else {
-            at += 1;
-            continue;
-        }
-        runs.remove(at);
-    }
-    runs
 }
 
 fn is_near(hz: f64, other_hz: f64) -> bool {
@@ -252,7 +231,10 @@ impl Part {
         envelope: &Envelope,
         (after_s, before_s): (f64, f64),
     ) -> (f64, f64) {
-        let steady = upper_median(envelope.between(self.from_s, self.to_s)).unwrap_or(0.0);
+        // Without what dies away: it may have a pitch for as long as the note.
+        let loud = LOUD * envelope.highest(self.from_s, self.to_s);
+        let held = envelope.between(self.from_s, self.to_s).filter(|level| *level >= loud);
+        let steady = upper_median(held).unwrap_or(0.0);
         let (head_s, tail_s) = (self.from_s - EDGE_S.0, self.to_s + EDGE_S.1);
         // What is heard of the note itself on its first or last moment is no noise.
         let edge = |beside: f64| (EDGE * steady).max(2.0 * beside).min(0.5 * steady);

@@ -178,7 +178,7 @@ impl Model {
         silent.map(|fingering| self.file.sounding(self.file.fingerings[fingering].written)).collect()
     }
 
-    /// Place of a fingering's note over the lowest note, see [`PlayerModel::place`]. Real-time safe.
+    /// Place of a fingering's note in the compass of an instrument of this size, see [`PlayerModel::place`]. Real-time safe.
     pub fn place(&self, fingering: usize) -> f64 {
         PlayerModel::place(self.notes_hz[fingering], self.size_hz)
     }

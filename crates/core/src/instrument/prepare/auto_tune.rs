@@ -56,7 +56,7 @@ impl Accuracy {
     pub const FINE: Self = Self { close_cents: 0.02, sure_cents: 0.2, around: true, every_beginning: true };
 }
 
-/// How much longer than a B flat clarinet an instrument takes to settle: in proportion to its size.
+/// How much longer than a B flat clarinet an instrument takes to settle: in proportion to the period of its lowest note.
 pub(super) fn longer(model: &Model) -> f64 {
     let lowest_hz = model.notes_hz.first().copied().unwrap_or(LOWEST_HZ);
     (LOWEST_HZ / lowest_hz).clamp(1.0, 4.0)
