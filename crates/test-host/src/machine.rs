@@ -196,6 +196,7 @@ pub fn provide(packages: &[&Package]) -> Result<()> {
         bail!("missing, and no apt-get to install it with: {purposes}; the names are Debian's");
     }
     println!("installing {purposes}");
+    finish_interrupted()?;
     apt(&["update"])
         .and_then(|()| apt(&[&["install", "-y", "--no-install-recommends"], &names[..]].concat()))?;
     match missing.iter().find(|package| !(package.present)()) {
@@ -204,16 +205,34 @@ pub fn provide(packages: &[&Package]) -> Result<()> {
     }
 }
 
+/// What an interrupted run of this command left half installed: apt-get refuses to go on from there.
+fn finish_interrupted() -> Result<()> {
+    let audit = Command::new("dpkg").arg("--audit").output();
+    if !audit.is_ok_and(|audit| !audit.stdout.is_empty()) {
+        return Ok(());
+    }
+    // What it cannot configure, apt-get installs again.
+    let _ = run(as_root("dpkg").args(["--configure", "-a"]));
+    apt(&["install", "-y", "--fix-broken"])
+}
+
 fn apt(args: &[&str]) -> Result<()> {
+    let mut command = as_root("apt-get");
+    // Another apt may hold the lock for a while.
+    command.args(["-q", "-o", "DPkg::Lock::Timeout=500"]).args(args);
+    run(&mut command).context("install the packages named above by hand, then try again")
+}
+
+/// A command of Debian's packages, with sudo unless this is root; it asks nothing.
+fn as_root(program: &str) -> Command {
     let root = Command::new("id").arg("-u").output().is_ok_and(|id| id.stdout.trim_ascii() == b"0");
     let mut command = if root {
-        Command::new("apt-get")
+        Command::new(program)
     } else {
         let mut sudo = Command::new("sudo");
-        sudo.arg("apt-get");
+        sudo.arg(program);
         sudo
     };
-    // Another apt may hold the lock for a while.
-    command.args(["-q", "-o", "DPkg::Lock::Timeout=500"]).args(args).env("DEBIAN_FRONTEND", "noninteractive");
-    run(&mut command).context("install the packages named above by hand, then try again")
+    command.env("DEBIAN_FRONTEND", "noninteractive");
+    command
 }

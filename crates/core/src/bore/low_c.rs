@@ -46,8 +46,8 @@ pub(super) fn extended(mut file: InstrumentFile) -> InstrumentFile {
     // A cone ends at this hole.
     let behind = file.bore.partition_point(|segment| segment.x_start_m < from_m);
     let Some(flare) = file.bore.get(behind) else { return file };
-    // To a nanometre, as the file has it: without the digits that an addition adds.
-    let moved = |x_m: f64| ((x_m + TUBE_M) * 1e9).round() / 1e9;
+    // To a nanometre and by way of millimetres, as the file has it: without the digits that an addition adds.
+    let moved = |x_m: f64| ((x_m + TUBE_M) * 1e9).round() / 1e6 / 1e3;
     let tube = BoreSegment { x_end_m: moved(flare.x_start_m), r_end_m: flare.r_start_m, ..flare.clone() };
     for segment in &mut file.bore[behind..] {
         (segment.x_start_m, segment.x_end_m) = (moved(segment.x_start_m), moved(segment.x_end_m));
