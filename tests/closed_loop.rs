@@ -11,6 +11,8 @@ mod parallel;
 mod player;
 #[path = "closed_loop/slurs.rs"]
 mod slurs;
+#[path = "../crates/core/tests/support/some.rs"]
+mod some;
 
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Model, Settings};
@@ -24,6 +26,7 @@ use felt::{FeltThreshold, Fingers};
 use heard::{Ear, SoundOnset, least_squares};
 use parallel::each;
 use player::LoopPlayer;
+use some::some;
 use std::sync::{Arc, LazyLock};
 
 static MODEL: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(Model::built_in(48_000.0).unwrap()));
@@ -148,6 +151,7 @@ fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
         .flat_map(|condition| (0..conditions[condition].2.notes().len()).map(move |note| (condition, note)))
         .filter(|&(_, note)| MODEL.speaks(note))
         .collect();
+    let runs = some(runs, 4);
     let passages = each(&runs, |&(condition, note)| {
         let table = &conditions[condition].2;
         passage(table, &table.notes()[note])

@@ -6,6 +6,7 @@ All studies, or those whose name contains one of the words. python_examples.py r
 import concurrent.futures
 import functools
 import itertools
+import os
 import pathlib
 import sys
 
@@ -16,9 +17,11 @@ import simulated_study  # noqa: E402
 import study_questions  # noqa: E402
 from study_measures import by_trial, summarise  # noqa: E402
 
-SEEDS = 100
-# Of the acceptance: players of the null study, and in how many of 100 studies it must find nothing, and the effect.
-NULL_PLAYERS, NOTHING_IN, EFFECT_IN = 8, 95, 80
+# Where this is set, all studies are played; it takes three times as long.
+ALL = "CHALUMEAU_ALL_CASES" in os.environ
+SEEDS = 100 if ALL else 36
+# Of the acceptance: players of the null study, and in which share of studies it must find nothing, and the effect.
+NULL_PLAYERS, NOTHING_IN, EFFECT_IN = 8, 0.95, 0.8
 ALPHA = 0.05
 
 
@@ -56,21 +59,23 @@ def equal_hands_find_nothing():
     # Eight players are too few for Holm over seven questions, so look at p itself as well.
     p = np.array([[row["p"] for row in rows.values()] for rows in found])
     print(f"  {NULL_PLAYERS} equal hands: nothing in {clean} of {SEEDS} studies; p <= {ALPHA} in {(p <= ALPHA).sum()} of {p.size}")
-    assert clean >= NOTHING_IN, clean
+    assert clean >= NOTHING_IN * SEEDS, clean
     assert (p <= ALPHA).mean() <= 1.5 * ALPHA, (p <= ALPHA).mean()
 
 
 def enough_equal_hands_find_nothing_either():
     """Also below and above the reference, where the condition always changes the torque in the same direction."""
-    players, seeds = study_questions.ENOUGH_PARTICIPANTS, range(500, 550)
+    players, seeds = study_questions.ENOUGH_PARTICIPANTS, range(500, 550 if ALL else 518)
     found = studies(players, seeds)
     for opening in ("all", "below", "above"):
         rows = [study[opening] for study in found]
         count = sum(map(is_anything_found, rows))
         small = {name: sum(study[name]["p"] <= ALPHA for study in rows) for name in rows[0]}
         print(f"  {players} equal hands, {opening}: something in {count} of {len(rows)} studies; p <= {ALPHA} in {small}")
-        # Of 50 studies with a true rate of 5 %, more than 6 have something by chance in 1 % of cases.
-        assert count <= 6 and max(small.values()) <= 8, (opening, count, small)
+        # Of 50 studies with a true rate of 5 %, more than 6 have something by chance in 1 % of cases; of 18, more than 3. The seven
+        # p of each are looked at together.
+        most, most_of_one = (6, 8) if ALL else (3, 4)
+        assert count <= most and max(small.values()) <= most_of_one, (opening, count, small)
 
 
 def without_equal_travel_the_reed_is_measured():
@@ -107,7 +112,7 @@ def a_planted_effect_of_one_standard_deviation_is_found():
         f"of {SEEDS} studies, something else in {others}"
     )
     assert 0.9 < dz < 1.2, dz
-    assert found >= EFFECT_IN, found
+    assert found >= EFFECT_IN * SEEDS, found
 
 
 TESTS = [

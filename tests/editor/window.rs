@@ -464,6 +464,9 @@ fn every_control_is_reached_by_the_tab_key() {
             .collect();
         let mut reached = BTreeSet::new();
         for _ in 0..3 * wanted.len() + 20 {
+            if wanted.is_subset(&reached) {
+                break;
+            }
             window.harness.key_press(Key::Tab);
             window.harness.run();
             let nodes = window.harness.root().children_recursive();
@@ -754,9 +757,9 @@ fn looking_changes_nothing_that_a_project_keeps() {
             let mut window = Window::new(tab, size);
             window.harness.state_mut().kept.zoom = zoom;
             let before = window.harness.state().kept.clone();
-            window.harness.run_steps(30);
+            window.harness.run_steps(10);
             window.harness.hover_at(egui::pos2(300.0, 300.0));
-            window.harness.run_steps(30);
+            window.harness.run_steps(10);
             assert_eq!(window.harness.state().kept, before);
             assert!(window.host.told().is_empty(), "nor any parameter");
         }

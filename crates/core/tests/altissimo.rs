@@ -5,6 +5,8 @@
 
 #[path = "support/rendered.rs"]
 mod rendered;
+#[path = "support/some.rs"]
+mod some;
 
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::bore::bundled::Bundled;
@@ -13,6 +15,7 @@ use chalumeau_core::instrument::{Model, Preparation, Settings, Wanted};
 use chalumeau_core::parallel;
 use chalumeau_core::units::{WrittenNote, cents};
 use rendered::rendered;
+use some::some;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -70,6 +73,7 @@ fn worst(instrument: Bundled) -> (f64, f64) {
         let model = prepared(instrument, rate_hz);
         let cases: Vec<(u8, f32)> =
             NOTES.into_iter().flat_map(|written| BREATHS.map(|breath| (written, breath))).collect();
+        let cases = some(cases, 2);
         let play = |at: usize| heard(&model, rate_hz, cases[at].0, cases[at].1);
         let found = parallel::each(cases.len(), play, &mut |_| ControlFlow::Continue(())).unwrap();
         for (&(written, breath), heard) in cases.iter().zip(&found) {
@@ -77,7 +81,7 @@ fn worst(instrument: Bundled) -> (f64, f64) {
         }
         all.extend(found);
     }
-    assert_eq!(all.len(), 2 * NOTES.len() * BREATHS.len());
+    assert!(all.len() >= NOTES.len() * BREATHS.len());
     let greatest = |of: fn(&Heard) -> f64| {
         all.iter().map(of).fold(0.0, |most: f64, x| if x > most || x.is_nan() { x } else { most })
     };
@@ -153,6 +157,7 @@ fn slurs_to_and_from_the_highest_notes_arrive() {
             .chain(down)
             .flat_map(|(from, to)| [20, 44, 78, 112].map(|controller| (from, to, controller)))
             .collect();
+        let cases = some(cases, 3);
         let slur = |at: usize| {
             let (from, to, controller) = cases[at];
             let out = played(&model, controller, &[(0.0, from), (0.6, to)], 1.4);
@@ -218,6 +223,7 @@ fn slurs_from_and_into_the_altissimo_arrive_soon() {
                 .into_iter()
                 .flat_map(|(from, to)| [44, 78, 127].map(|controller| (from, to, controller)))
                 .collect();
+            let cases = some(cases, 3);
             let arrive = |at: usize| arrival_s(&model, cases[at]);
             let found = parallel::each(cases.len(), arrive, &mut |_| ControlFlow::Continue(())).unwrap();
             let mut sorted = found.clone();

@@ -140,11 +140,13 @@ fn compare(seed: u64, events: usize, mut choirs: Ensemble) -> usize {
     changes
 }
 
-/// Who plays side by side gives the bits that all give alone, whatever happens: a hundred thousand events.
+/// Who plays side by side gives the bits that all give alone, whatever happens: thirty thousand events, or with
+/// `CHALUMEAU_ALL_CASES` a hundred thousand.
 #[test]
 fn a_choir_gives_the_bits_of_voices_alone() {
-    let changes = compare(1, 100_000, Ensemble::built_in(RATE_HZ).unwrap());
-    assert!(changes > 100, "{changes} changes of place");
+    let events = if std::env::var_os("CHALUMEAU_ALL_CASES").is_some() { 100_000 } else { 30_000 };
+    let changes = compare(1, events, Ensemble::built_in(RATE_HZ).unwrap());
+    assert!(changes > 50, "{changes} changes of place");
 }
 
 #[test]
