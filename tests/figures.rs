@@ -307,6 +307,25 @@ fn orbit_closes_and_beats_when_blown_hard() {
 }
 
 #[test]
+fn haptic_draws_the_note_that_is_asked_for_or_those_that_stand_for_all() {
+    let names = |command: &str| -> Vec<String> {
+        lines(&drawn(command))
+            .into_iter()
+            .map(|line| line.name.clone())
+            .filter(|name| name.contains(" mNm at "))
+            .collect()
+    };
+    for command in ["haptic --written E3 --plot FIGURE", "haptic --written E3 --curve --plot FIGURE"] {
+        let one = names(command);
+        assert!(one.len() == 1 && one[0].starts_with("E3: "), "{command}: {one:?}");
+    }
+    let few = names("haptic --all --law pressure --contrast 1 --plot FIGURE");
+    assert!((2..=4).contains(&few.len()), "{few:?}");
+    assert!(few.iter().any(|name| name.starts_with("E3: ")), "the lowest: {few:?}");
+    assert!(few.iter().any(|name| name.starts_with("C5: ")), "the reference: {few:?}");
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused_with_the_remedy_and_leaves_nothing() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("there.png"), "mine").unwrap();

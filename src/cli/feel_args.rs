@@ -21,6 +21,15 @@ enum LawArg {
     Pressure,
 }
 
+/// A law as figures name it.
+pub fn law_name(law: TorqueLaw) -> &'static str {
+    match law {
+        TorqueLaw::Flow => "flow",
+        TorqueLaw::Pressure => "pressure",
+        TorqueLaw::Free => "free",
+    }
+}
+
 /// Orders by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum OrderArg {

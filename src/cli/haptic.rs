@@ -2,7 +2,8 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, number};
-use crate::cli::feel_args::{FeelArgs, refused_in_flags};
+use crate::cli::feel_args::{FeelArgs, law_name, refused_in_flags};
+use crate::cli::plot_args::{Plot, PlotArgs};
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::feel_parameters::HARD_CEILING_MNM;
@@ -16,6 +17,7 @@ use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::reed::ReedTables;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
 use chalumeau_core::units::WrittenNote;
+use chalumeau_figure::felt::{AtContrast, Torque, few, torques};
 use chalumeau_knob::touch::feel::NO_MOTOR;
 use clap::Args;
 
@@ -30,6 +32,7 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau haptic --all --zeta 0.3 --contrast 1 --csv -
   chalumeau haptic --written 52 --law flow --curve --csv e3.csv
+  chalumeau haptic --written E3 --contrast 1 --plot e3.png
   chalumeau haptic --all --H 3 --k 0.3849          a wider reed, as stiff as before
   chalumeau haptic --all --H 3 --equal-travel      the same as a study has it
   chalumeau haptic --all --order covered-holes --contrast 2";
@@ -45,7 +48,8 @@ Examples:
 ///
 /// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding; a note
 /// for which the theory finds no pressures has nan for them. A note that does not speak in tune and stays silent, such as C#7, has numbers. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
-/// against the breath.
+/// against the breath. --plot draws torque against angle: of the note that is asked for, or of the easiest, the lowest, the
+/// reference and the hardest.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct HapticCommand {
@@ -60,6 +64,8 @@ pub struct HapticCommand {
     instrument: InstrumentArg,
     #[command(flatten)]
     table: TableArgs,
+    #[command(flatten)]
+    plot: PlotArgs,
 }
 
 /// What is felt: the torque's law, the reed and the air.
@@ -138,7 +144,7 @@ impl FeltReedArgs {
 
 impl HapticCommand {
     pub fn run(&self) -> Result<(), Failure> {
-        self.table.check_files(&[self.instrument.file()], &[])?;
+        self.table.check_files(&[self.instrument.file()], &[self.plot.path()])?;
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         if self.curve && self.notes.one().is_none() {
@@ -146,9 +152,11 @@ impl HapticCommand {
             return Err(Failure::Usage(format!("--curve is for one note; {right}")));
         }
         let feel = self.felt.feel(&file, self.notes.one())?;
+        let plot = self.plot.open(self.table.force())?;
         let wanted = |feel: &&NoteFeel| notes.contains(&feel.written);
         if self.curve {
-            return feel.notes().iter().filter(wanted).try_for_each(|note| self.curve(note));
+            feel.notes().iter().filter(wanted).try_for_each(|note| self.curve(note))?;
+            return self.draw(plot, &file, &feel);
         }
         let mut table = self.table.open(
             "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding",
@@ -182,7 +190,22 @@ impl HapticCommand {
                 number(sounding, 6)
             ))?;
         }
-        table.finish()
+        table.finish()?;
+        self.draw(plot, &file, &feel)
+    }
+
+    /// Draws the note that is asked for, or those that stand for all.
+    fn draw(&self, plot: Plot, file: &InstrumentFile, feel: &FeelTable) -> Result<(), Failure> {
+        let design = self.felt.feel.design(file)?;
+        let one = |written| feel.notes().iter().filter(|note| note.written == written).collect();
+        let notes: Vec<&NoteFeel> = self.notes.one().map_or_else(|| few(feel), one);
+        let remark =
+            format!("{}; zeta {}, {}", file.name, self.felt.reed.zeta, self.felt.feel.exaggeration());
+        plot.draw(|| {
+            let notes = Ok(notes.into_iter().map(Torque::of).collect());
+            let panel = AtContrast { contrast: design.contrast, notes };
+            torques(law_name(design.law), &remark, self.felt.ceiling, &[panel])
+        })
     }
 
     fn curve(&self, note: &NoteFeel) -> Result<(), Failure> {

@@ -296,7 +296,8 @@ fn python_examples() -> Result<()> {
     machine::run(Command::new(&python).arg(tests).env(artefacts::PROGRAM, &programs()?.program))
 }
 
-/// The wheel as a user gets it: built from the sources, installed where nothing else is, and tested.
+/// The wheel, built from the sources, installed where nothing else is, and tested. Users get that of the profile for releases, which
+/// takes three times as long to build.
 fn python_package() -> Result<()> {
     let modules =
         "maturin, pytest, mypy, numpy, pyarrow, distributed, nbformat, nbclient, ipykernel, matplotlib";
@@ -305,7 +306,7 @@ fn python_package() -> Result<()> {
     let wheels = machine::target().join("wheels");
     // Another version's wheel would be installed beside the new one.
     let _ = fs::remove_dir_all(&wheels);
-    let build = ["-m", "maturin", "build", "--out"];
+    let build = ["-m", "maturin", "build", "--profile", "dev", "--out"];
     machine::run(Command::new(&python).args(build).arg(&wheels).current_dir(&folder))?;
     let wheel = fs::read_dir(&wheels)?.next().context("maturin left no wheel")??.path();
     let clean = machine::target().join("venv-clean");

@@ -465,10 +465,10 @@ fn slurs_down_over_the_break_keep_sounding() {
             .collect();
         let all: Vec<(u8, u8, u8)> =
             pairs.iter().flat_map(|&(from, to)| [20, 45, 76].map(|value| (from, to, value))).collect();
-        let (all, pairs) = (some(all, 3), some(pairs, 3));
         let slurs = each(all.len(), |n| slurred(all[n].0, all[n].1, all[n].2));
         let holes_db = [0.5, 0.9, 1.0].map(|share| quantile(slurs.iter().map(|s| s.hole_db), share));
         let lost = slurs.iter().filter(|s| !s.arrives).count();
+        let pairs = some(pairs, 3);
         let loud = each(2 * pairs.len(), |n| slurred(pairs[n / 2].0, pairs[n / 2].1, [108, 127][n % 2]));
         let lost = lost + loud.iter().filter(|s| !s.arrives).count();
         println!("{name}: {} slurs, {lost} lost, holes {holes_db:.1?} dB", slurs.len() + loud.len());

@@ -5,9 +5,17 @@
 use crate::breath::written_axis;
 use crate::palette::Colour;
 use crate::{Anchor, Axis, Dash, Direction, Figure, Line, Mark, Panel, Points, SecondAxis, Shape, Text};
+use chalumeau_core::haptics::torque_law::torque_mnm;
+use chalumeau_core::haptics::{FeelTable, NoteFeel};
+use chalumeau_core::reed::ReedTables;
 
 /// Millinewton metres in a newton centimetre, as firmware counts.
 const NCM: f64 = 0.1;
+/// Where a curve begins, in the slap region, and how far behind the wall it ends, degrees.
+const FROM_DEG: f64 = -150.0;
+const BEHIND_WALL_DEG: f64 = 10.0;
+/// Points along a curve.
+const POINTS: usize = 400;
 
 /// The torque of one note.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +28,39 @@ pub struct Torque {
     pub on: (f64, f64),
     /// The resting reed is shut.
     pub close: (f64, f64),
+}
+
+impl Torque {
+    /// The torque of a note, as the firmware makes it.
+    pub fn of(note: &NoteFeel) -> Self {
+        let tables = ReedTables::reference();
+        let at = |deg: f64| (deg, torque_mnm(&note.feel, tables, deg));
+        let to_deg = f64::from(note.feel.wall_deg) + BEHIND_WALL_DEG;
+        let along = |n: usize| FROM_DEG + (to_deg - FROM_DEG) * n as f64 / POINTS as f64;
+        Self {
+            name: note.written.to_string(),
+            curve: (0..=POINTS).map(|n| at(along(n))).collect(),
+            on: at(note.landmarks.a_on_deg),
+            close: at(note.landmarks.a_close_deg),
+        }
+    }
+}
+
+/// Notes that stand for all of a table: the easiest, the lowest, the reference, the hardest.
+pub fn few(table: &FeelTable) -> Vec<&NoteFeel> {
+    let need = |note: &&NoteFeel| note.requirement.map_or(f64::NAN, |asked| asked.p_req_pa);
+    let sounding = || table.notes().iter().filter(|note| note.requirement.is_some());
+    let by = |a: &&NoteFeel, b: &&NoteFeel| need(a).total_cmp(&need(b));
+    let all = [
+        sounding().min_by(by),
+        sounding().min_by_key(|note| note.written),
+        Some(table.reference()),
+        sounding().max_by(by),
+    ];
+    let mut few: Vec<&NoteFeel> = all.into_iter().flatten().collect();
+    few.sort_by(by);
+    few.dedup_by_key(|note| note.written);
+    few
 }
 
 /// Several notes at one Contrast.

@@ -1,5 +1,6 @@
 //! The report's chapters "Breath" and "Haptics", for the instrument and the reed that were played.
 
+use crate::cli::feel_args::law_name;
 use crate::cli::render_job::RenderJob;
 use crate::cli::report::{number, word};
 use crate::parameters::{self, Kind};
@@ -12,7 +13,7 @@ use chalumeau_core::reed::ReedTables;
 use chalumeau_core::score::breath::GAMMA_MAX;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::breath::{NotePressures, Swell, Turn, pressures, turns};
-use chalumeau_figure::felt::{AtContrast, FeltThresholds, Torque, thresholds, torques};
+use chalumeau_figure::felt::{AtContrast, FeltThresholds, Torque, few, thresholds, torques};
 use chalumeau_figure::report::{Chapter, Plate, ReportTable, TableCell};
 use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::wire::message::TorqueLaw;
@@ -36,14 +37,6 @@ fn most_kpa() -> f64 {
     match parameters::find("full").map(|parameter| parameter.kind) {
         Some(Kind::Number(number)) => f64::from(number.max),
         _ => f64::INFINITY,
-    }
-}
-
-fn law_name(law: TorqueLaw) -> &'static str {
-    match law {
-        TorqueLaw::Flow => "flow",
-        TorqueLaw::Pressure => "pressure",
-        TorqueLaw::Free => "free",
     }
 }
 
@@ -200,27 +193,8 @@ impl<'a> BreathAndHaptics<'a> {
         Some((plate, format!("{outcome} {why}")))
     }
 
-    /// A few notes: the easiest, the lowest, the reference, the hardest.
-    fn few<'t>(&self, table: &'t FeelTable) -> Vec<&'t NoteFeel> {
-        let need = |note: &&NoteFeel| note.requirement.map_or(f64::NAN, |asked| asked.p_req_pa);
-        let sounding = || table.notes().iter().filter(|note| note.requirement.is_some());
-        let by = |a: &&NoteFeel, b: &&NoteFeel| need(a).total_cmp(&need(b));
-        let mut few: Vec<&NoteFeel> = [
-            sounding().min_by(by),
-            sounding().min_by_key(|note| note.written),
-            Some(table.reference()),
-            sounding().max_by(by),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        few.sort_by(by);
-        few.dedup_by_key(|note| note.written);
-        few
-    }
-
     fn turns(&self, table: &FeelTable) -> Plate {
-        let few = self.few(table);
+        let few = few(table);
         let most_deg = few.iter().map(|note| f64::from(note.feel.wall_deg)).fold(0.0, f64::max);
         let turn = |note: &&NoteFeel| {
             let kpa = |deg: f64| 1e-3 * note.map.pressure_pa(deg);
@@ -322,7 +296,7 @@ impl<'a> BreathAndHaptics<'a> {
                 let design = FeelDesign { law, contrast, ..self.design };
                 let table = self.table(&design);
                 refusals.push(self.refusal(&design, table.as_ref().err()));
-                let notes = table.map(|table| self.few(&table).into_iter().map(torque).collect());
+                let notes = table.map(|table| few(&table).into_iter().map(Torque::of).collect());
                 panels.push(AtContrast { contrast, notes: notes.map_err(|reason| reason.to_string()) });
             }
             plates.push(self.torques(law, &panels));
@@ -481,19 +455,6 @@ fn range(changes: &[NotePressures]) -> String {
             hard.speaks_kpa
         ),
         _ => "No note sounds with this reed.".to_owned(),
-    }
-}
-
-/// The torque of a note, as the firmware makes it.
-fn torque(note: &NoteFeel) -> Torque {
-    let tables = ReedTables::reference();
-    let at = |deg: f64| (deg, torque_mnm(&note.feel, tables, deg));
-    let (from, to) = (-150.0, f64::from(note.feel.wall_deg) + 10.0);
-    Torque {
-        name: note.written.to_string(),
-        curve: (0..=POINTS).map(|n| at(from + (to - from) * n as f64 / POINTS as f64)).collect(),
-        on: at(note.landmarks.a_on_deg),
-        close: at(note.landmarks.a_close_deg),
     }
 }
 

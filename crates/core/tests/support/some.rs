@@ -1,12 +1,13 @@
 //! A part of many cases.
 
-/// Where this variable is set, tests play every case. It takes three times as long.
-const ALL: &str = "CHALUMEAU_ALL_CASES";
+/// Whether tests play every case: `CHALUMEAU_ALL_CASES` is set.
+pub fn all_cases() -> bool {
+    std::env::var_os("CHALUMEAU_ALL_CASES").is_some()
+}
 
-/// One of so many cases, spread over all of them and over each of the things that cases combine; all where
-/// `CHALUMEAU_ALL_CASES` is set.
+/// One of so many cases, spread over all of them and over each of the things that cases combine; or all.
 pub fn some<T>(cases: Vec<T>, one_of: u32) -> Vec<T> {
-    if std::env::var_os(ALL).is_some() {
+    if all_cases() {
         return cases;
     }
     // Multiples of the golden ratio, which fill the circle evenly and never repeat.

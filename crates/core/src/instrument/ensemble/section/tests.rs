@@ -144,7 +144,7 @@ fn compare(seed: u64, events: usize, mut choirs: Ensemble) -> usize {
 /// `CHALUMEAU_ALL_CASES` a hundred thousand.
 #[test]
 fn a_choir_gives_the_bits_of_voices_alone() {
-    let events = if std::env::var_os("CHALUMEAU_ALL_CASES").is_some() { 100_000 } else { 30_000 };
+    let events = if option_env!("CHALUMEAU_ALL_CASES").is_some() { 100_000 } else { 30_000 };
     let changes = compare(1, events, Ensemble::built_in(RATE_HZ).unwrap());
     assert!(changes > 50, "{changes} changes of place");
 }
