@@ -199,8 +199,11 @@ impl HapticCommand {
         let design = self.felt.feel.design(file)?;
         let one = |written| feel.notes().iter().filter(|note| note.written == written).collect();
         let notes: Vec<&NoteFeel> = self.notes.one().map_or_else(|| few(feel), one);
-        let remark =
-            format!("{}; zeta {}, {}", file.name, self.felt.reed.zeta, self.felt.feel.exaggeration());
+        let (zeta, exaggeration) = (self.felt.reed.zeta, self.felt.feel.exaggeration());
+        let remark = format!(
+            "{}; zeta {zeta}, {exaggeration}. A disc stands where the note speaks, a ring where a resting reed is shut.",
+            file.name
+        );
         plot.draw(|| {
             let notes = Ok(notes.into_iter().map(Torque::of).collect());
             let panel = AtContrast { contrast: design.contrast, notes };
