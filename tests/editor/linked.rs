@@ -68,9 +68,17 @@ fn the_menu_leads_to_the_hosts_own() {
 #[test]
 fn a_device_brings_its_links_and_values_and_the_next_takes_them_back() {
     let mut window = linking(Tab::Breath);
-    for (device, links_now, wheel) in
-        [("EWI", 1, "Nothing"), ("Aerophone", 0, "Growl"), ("Breath controller", 0, "Vibrato")]
-    {
+    assert!(
+        window.harness.query_by_label_contains("As in a new instance").is_some(),
+        "nobody has chosen one"
+    );
+    for (device, links_now, wheel) in [
+        ("EWI", 1, "Nothing"),
+        ("Aerophone", 0, "Growl"),
+        ("Breath controller", 0, "Vibrato"),
+        // Needs what a new instance has.
+        ("WARBL", 0, "Vibrato"),
+    ] {
         window.harness.get_by_role_and_label(Role::ComboBox, "Choose a device").click();
         window.harness.run();
         window.harness.get_by_label(device).click();
@@ -79,6 +87,11 @@ fn a_device_brings_its_links_and_values_and_the_next_takes_them_back() {
         assert_eq!(window.host.text("wheel", window.host.value("wheel")), wheel, "{device}");
         window.harness.get_by_label(&chalumeau::controllers::factory::find(device).unwrap().shows);
     }
+    window.harness.get_by_role_and_label(Role::ComboBox, "Choose a device").click();
+    window.harness.run();
+    window.harness.get_by_label("Any keyboard or controller").click();
+    window.harness.run();
+    window.harness.get_by_label_contains("As in a new instance");
 }
 
 #[test]

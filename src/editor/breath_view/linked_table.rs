@@ -1,6 +1,6 @@
 //! The devices to choose from, and the table of controllers that the user has linked to parameters.
 
-use egui::{DragValue, RichText, Role, Ui, WidgetInfo};
+use egui::{DragValue, Id, RichText, Role, Ui, WidgetInfo};
 
 use crate::controllers::{ControllerMap, ParameterLink, factory, source_name};
 use crate::editor::controls::{Hands, heading};
@@ -10,6 +10,16 @@ use crate::parameters::{Kind, Parameter};
 
 /// Of the list of devices, points: all of them at once.
 const LIST_HEIGHT: f32 = 320.0;
+
+/// What the list offers first. Some devices need nothing else, so that their names would stand where nobody has chosen one.
+fn any_device() -> ControllerMap {
+    ControllerMap {
+        name: "Any keyboard or controller".to_owned(),
+        shows: "As in a new instance: keys blow by their velocity; CC2, CC11 or pressure takes over when it comes.".to_owned(),
+        links: Vec::new(),
+        values: Vec::new(),
+    }
+}
 
 /// Whether parameters and these links are as a device needs them.
 fn is_set(hands: &Hands, links: &[ParameterLink], map: &ControllerMap) -> bool {
@@ -27,11 +37,17 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
     let c = Colours::here(ui);
     heading(ui, "Device");
     let list = egui::ComboBox::from_id_salt("controllers of a device").width(ui.available_width() - 8.0);
-    let now = factory::all().iter().find(|map| is_set(hands, &all, map));
+    let any = any_device();
+    let maps = || std::iter::once(&any).chain(factory::all());
+    // Of those that need the same, the one that was chosen.
+    let last = Id::unique("device that was chosen");
+    let name = ui.data(|data| data.get_temp::<String>(last));
+    let fitting = || maps().filter(|map| is_set(hands, &all, map));
+    let now = fitting().find(|map| Some(&map.name) == name.as_ref()).or_else(|| fitting().next());
     let mut chosen = None;
     let text = now.map_or("Choose a device", |map| map.name.as_str());
     let response = list.height(LIST_HEIGHT).selected_text(text).show_ui(ui, |ui| {
-        for map in factory::all() {
+        for map in maps() {
             let is_here = now == Some(map);
             if ui.selectable_label(is_here, &map.name).on_hover_text(&map.shows).clicked() {
                 chosen = Some(map);
@@ -43,6 +59,7 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
         ui.label(RichText::new(&map.shows).font(theme::small()).color(c.quiet));
     }
     let Some(map) = chosen else { return };
+    ui.data_mut(|data| data.insert_temp(last, map.name.clone()));
     links.learn(None);
     links.replace(&map.links);
     let values = factory::values(map).into_iter();
