@@ -1,5 +1,8 @@
 //! The editor without a window: every control by hand, keys and screen reader; how it looks; what a frame costs.
 
+#[path = "../crates/core/tests/support/some.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
+mod some;
 #[path = "support/editor.rs"]
 mod support;
 

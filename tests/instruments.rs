@@ -28,7 +28,7 @@ use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::units::{Air, REFERENCE_RADIUS_M, WrittenNote, cents};
 use oracle::Oracle;
 use reference::{RANGE, Spread};
-use some::some;
+use some::{all_cases, some};
 
 /// Live at hosts of the 48 and 44.1 kHz families, and twice that.
 const LIVE_HZ: [f64; 2] = [96_000.0, 88_200.0];
@@ -78,8 +78,12 @@ fn cases() -> &'static [Case] {
             ),
             ("waisted", local(include_str!("instruments/waisted.toml")), room),
             ("built-in at 10 C", InstrumentFile::built_in(), Air::at(10.0)),
+            // Between those sizes.
+            ("built-in x 0.8", InstrumentFile::built_in().scaled(0.8), room),
+            ("A", scaled(1.0), room),
         ]
         .into_iter()
+        .filter(|(name, ..)| all_cases() || !["built-in x 0.8", "A"].contains(name))
         .map(|(name, file, air)| {
             let fitted = LIVE_HZ
                 .into_iter()

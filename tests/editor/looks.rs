@@ -15,6 +15,7 @@ use image::{RgbaImage, imageops};
 
 use crate::c4;
 use crate::fingerings::found;
+use crate::some::all_cases;
 use crate::support::{Fake, picture, shot, things, window};
 
 const SIZES: [(f32, f32); 3] = [(1100.0, 720.0), (700.0, 480.0), (1600.0, 1000.0)];
@@ -67,10 +68,9 @@ fn every_view_looks_as_it_did() {
     let (kept_in, failed_in) = (folder("tests/editor/looks"), folder("target/editor-looks"));
     let snapshot = c4();
     let mut wrong = Vec::new();
-    let is_all = std::env::var_os("CHALUMEAU_ALL_CASES").is_some();
     // The usual size in both themes, each of the others in one.
     let is_looked_at =
-        |size, is_dark| is_update || is_all || size == SIZES[0] || is_dark == (size == SIZES[1]);
+        |size, is_dark| is_update || all_cases() || size == SIZES[0] || is_dark == (size == SIZES[1]);
     for size in SIZES {
         for is_dark in [false, true].into_iter().filter(|is_dark| is_looked_at(size, *is_dark)) {
             let views = Tab::ALL.map(|tab| (tab, tab.name().to_lowercase()));

@@ -297,7 +297,7 @@ fn python_examples() -> Result<()> {
 }
 
 /// The wheel, built from the sources, installed where nothing else is, and tested. Users get that of the profile for releases, which
-/// takes three times as long to build.
+/// takes longer to build.
 fn python_package() -> Result<()> {
     let modules =
         "maturin, pytest, mypy, numpy, pyarrow, distributed, nbformat, nbclient, ipykernel, matplotlib";

@@ -79,7 +79,7 @@ fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
     values[((values.len() - 1) as f64 * share).round() as usize]
 }
 
-/// Wander of every note, each held for 4 s after its attack, one after another at each of five dynamics.
+/// Wander of every note, each held for 4 s after its attack, one after another at each of these values of the breath controller.
 fn wanders(settings: &Settings, values: &[u8]) -> Vec<Wander> {
     let notes: Vec<u8> = NOTES.collect();
     let count = values.len();

@@ -18,8 +18,3 @@ pub mod midi;
 #[cfg(target_os = "linux")]
 pub mod screen;
 pub mod simulator;
-
-/// Whether tests do all that they can, and not a third of it: `CHALUMEAU_ALL_CASES` is set.
-pub fn all_cases() -> bool {
-    std::env::var_os("CHALUMEAU_ALL_CASES").is_some()
-}

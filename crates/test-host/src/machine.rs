@@ -211,9 +211,10 @@ fn finish_interrupted() -> Result<()> {
     if !audit.is_ok_and(|audit| !audit.stdout.is_empty()) {
         return Ok(());
     }
-    // What it cannot configure, apt-get installs again.
+    println!("finishing an installation that was interrupted");
+    // What it cannot configure, apt-get installs again. It removes nothing.
     let _ = run(as_root("dpkg").args(["--configure", "-a"]));
-    apt(&["install", "-y", "--fix-broken"])
+    apt(&["install", "-y", "--fix-broken", "--no-remove"])
 }
 
 fn apt(args: &[&str]) -> Result<()> {

@@ -8,7 +8,6 @@ mod live;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use chalumeau_test_host::all_cases;
 use chalumeau_test_host::clap::{At, Plugin, Say, Session};
 use chalumeau_test_host::knob_setup::{connect, wait_until_live};
 use chalumeau_test_host::simulator::{Simulator, serial_number};
@@ -35,6 +34,9 @@ const STOPS: [Stop; 7] = [
     Stop::NoProcess,
     Stop::MainThreadHangs,
 ];
+
+/// Rounds through all of them.
+const ROUNDS: usize = 3;
 
 impl Stop {
     /// Longest torque after it, s: after an explicit stop, or after somebody stands still.
@@ -158,9 +160,7 @@ fn late(round: usize) -> Vec<String> {
 
 #[test]
 fn torque_ends_with_the_users_word() {
-    // Rounds through all of them.
-    let rounds = if all_cases() { 3 } else { 1 };
-    for round in 0..rounds {
+    for round in 0..ROUNDS {
         // A machine that stalls for 80 ms disarms the knob, as it must; the round may have another try.
         let failed = (0..4).map(|_| late(round)).take_while(|late| !late.is_empty()).collect::<Vec<_>>();
         assert!(failed.len() < 4, "{failed:?}");

@@ -1,5 +1,7 @@
 //! The devices to choose from, and the table of controllers that the user has linked to parameters.
 
+use std::sync::LazyLock;
+
 use egui::{DragValue, Id, RichText, Role, Ui, WidgetInfo};
 
 use crate::controllers::{ControllerMap, ParameterLink, factory, source_name};
@@ -12,14 +14,14 @@ use crate::parameters::{Kind, Parameter};
 const LIST_HEIGHT: f32 = 320.0;
 
 /// What the list offers first. Some devices need nothing else, so that their names would stand where nobody has chosen one.
-fn any_device() -> ControllerMap {
-    ControllerMap {
-        name: "Any keyboard or controller".to_owned(),
-        shows: "As in a new instance: keys blow by their velocity; CC2, CC11 or pressure takes over when it comes.".to_owned(),
-        links: Vec::new(),
-        values: Vec::new(),
-    }
-}
+static ANY_DEVICE: LazyLock<ControllerMap> = LazyLock::new(|| ControllerMap {
+    name: "Any keyboard or controller".to_owned(),
+    shows:
+        "As in a new instance: keys blow by their velocity; CC2, CC11 or pressure takes over when it comes."
+            .to_owned(),
+    links: Vec::new(),
+    values: Vec::new(),
+});
 
 /// Whether parameters and these links are as a device needs them.
 fn is_set(hands: &Hands, links: &[ParameterLink], map: &ControllerMap) -> bool {
@@ -37,8 +39,7 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
     let c = Colours::here(ui);
     heading(ui, "Device");
     let list = egui::ComboBox::from_id_salt("controllers of a device").width(ui.available_width() - 8.0);
-    let any = any_device();
-    let maps = || std::iter::once(&any).chain(factory::all());
+    let maps = || std::iter::once(&*ANY_DEVICE).chain(factory::all());
     // Of those that need the same, the one that was chosen.
     let last = Id::unique("device that was chosen");
     let name = ui.data(|data| data.get_temp::<String>(last));

@@ -119,7 +119,8 @@ mod tests {
     #[test]
     fn the_other_notes_stay_where_they_were_and_have_a_peak() {
         let (file, before) = (Bundled::Bass.file(), Bundled::BFlat.file().scaled(2.0));
-        for written in (52..=97).filter(|written| written % 3 == 0 || *written == A6.0.0) {
+        let is_all = option_env!("CHALUMEAU_ALL_CASES").is_some();
+        for written in (52..=97).filter(|written| is_all || written % 3 == 0 || *written == A6.0.0) {
             let fingering = before.fingering(WrittenNote(written)).unwrap();
             let tube = InstrumentFile { transposition: 14, ..before.clone() };
             let (now, then) = (off_cents(&file, written), off_cents(&tube, written));
