@@ -117,6 +117,7 @@ impl<const N: usize> Choirs<N> {
         (0..N).find(|&lane| !self.places.contains(&Some((choir, lane))))
     }
 
+    #[inline(never)] // Seldom played and slow to compile: once is enough.
     fn leave(&mut self, number: usize, seat: &mut Seat) {
         let Some((choir, lane)) = self.places[number].take() else { return };
         self.members[choir] &= !(1 << number);
