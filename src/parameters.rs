@@ -186,6 +186,12 @@ impl Parameter {
         self.is_compared() && self.is_restored && !is_status && self.id != "qual"
     }
 
+    /// Whether it fits the instrument to a player's hands and devices, and is no part of a sound: a preset that does not name it leaves it as
+    /// it is.
+    pub fn is_players_own(&self) -> bool {
+        ["bsoft", "bloud", "bfrom", "bdead", "transp", "keysw"].contains(&self.id)
+    }
+
     /// Whether the A/B comparison carries it: what undo carries, and the instrument.
     pub fn is_compared(&self) -> bool {
         self.is_undoable || self.id == "instr"

@@ -2,7 +2,8 @@
 //!
 //! A preset holds the values that differ from the default, by the ids and texts of the one table of parameters
 //! ([`crate::parameters`]). Choosing it puts every other parameter that belongs to presets to its default, so that a preset
-//! means the same whatever was set before. Out of presets stay what acts, arms or plays, and how finely a host renders
+//! sounds the same whatever was set before. What fits the instrument to a player's hands and devices changes only where a preset names it
+//! ([`Parameter::is_players_own`]). Out of presets stay what acts, arms or plays, and how finely a host renders
 //! ([`Parameter::is_in_presets`]).
 //!
 //! - `file`: the text of a preset, read and written
@@ -81,9 +82,12 @@ impl Preset {
         own.map_or_else(|| parameter.default_value(), |(_, value)| *value)
     }
 
-    /// Every parameter that a preset sets, with its value.
+    /// Every parameter that this preset sets, with its value; of the player's own only those that it names.
     pub fn all_values(&self) -> impl Iterator<Item = (&'static Parameter, Value)> {
-        Self::parameters().map(|parameter| (parameter, self.value(parameter)))
+        let is_named = |parameter: &Parameter| self.values.iter().any(|(named, _)| named.id == parameter.id);
+        Self::parameters()
+            .filter(move |parameter| !parameter.is_players_own() || is_named(parameter))
+            .map(|parameter| (parameter, self.value(parameter)))
     }
 
     /// The settings of the instrument, as the plugin has them under this preset before any controller moves.
@@ -232,6 +236,21 @@ mod tests {
         for id in ["instr", "lip", "gain", "law", "bendr", "heard", "a4"] {
             assert!(!left.contains(&id), "{id}");
         }
+    }
+
+    #[test]
+    fn a_preset_leaves_the_players_own_unless_it_names_it() {
+        let sets = |preset: &Preset, id: &str| preset.all_values().any(|(parameter, _)| parameter.id == id);
+        let own: Vec<_> = PARAMETERS.iter().filter(|parameter| parameter.is_players_own()).collect();
+        assert_eq!(own.len(), 6);
+        assert!(own.iter().all(|parameter| parameter.is_in_presets()));
+        for preset in factory::all() {
+            assert!(own.iter().all(|parameter| !sets(preset, parameter.id)), "{}", preset.name);
+            assert!(sets(preset, "lip") && sets(preset, "bendr"), "{}", preset.name);
+        }
+        let mine =
+            Preset::parse("format = 1\nname = \"Mine\"\n\n[parameters]\ntransp = \"-2 st\"\n").unwrap();
+        assert!(sets(&mine, "transp") && !sets(&mine, "bsoft"));
     }
 
     #[test]

@@ -56,13 +56,24 @@ pub fn state(marks: &PressureMarks, kpa: f32, c: &Colours) -> (&'static str, Col
 
 /// The marks a scale shows: pressure, word, colour; in order of pressure.
 pub fn marks(snapshot: &Snapshot, c: &Colours) -> Vec<(f32, &'static str, Color32)> {
-    let marks = snapshot.marks();
-    let mut all = vec![(marks.closes_kpa, "closes", c.closes)];
-    all.extend(marks.speaks_kpa.map(|kpa| (kpa, "speaks", c.speaks)));
-    all.extend(marks.beats_kpa.map(|kpa| (kpa, "beats", c.beats)));
-    all.extend(marks.chokes_kpa.map(|kpa| (kpa, "chokes", c.chokes)));
+    let named = named(&snapshot.marks(), c);
+    let mut all: Vec<_> =
+        named.into_iter().filter_map(|(kpa, name, colour)| Some((kpa?, name, colour))).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all
+}
+
+/// Pressure of a mark, if the note has it, its word and its colour.
+pub type NamedMark = (Option<f32>, &'static str, Color32);
+
+/// All marks, those a note lacks as well.
+pub fn named(marks: &PressureMarks, c: &Colours) -> [NamedMark; 4] {
+    [
+        (Some(marks.closes_kpa), "closes", c.closes),
+        (marks.speaks_kpa, "speaks", c.speaks),
+        (marks.beats_kpa, "beats", c.beats),
+        (marks.chokes_kpa, "chokes", c.chokes),
+    ]
 }
 
 /// What each mark means, for tool tips.

@@ -7,6 +7,7 @@ use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetIn
 
 use crate::controllers::breath_input::BreathInput;
 use crate::editor::breath_meter;
+use crate::editor::breath_meter::NamedMark;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, momentary, slider, switch};
@@ -320,7 +321,7 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
         return;
     }
     let full = f64::from(breath_meter::full_kpa(snapshot));
-    let marks = breath_meter::marks(snapshot, c);
+    let time = |n: usize| f64::from(track.step_s) * n as f64 - seconds;
     let height = ui.available_height();
     Chart {
         id: "breath history",
@@ -332,21 +333,39 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
         label: "Mouth pressure of the last seconds",
     }
     .show(ui, |plot| {
-        for (index, (at, name, colour)) in marks.into_iter().enumerate() {
-            let line =
-                egui_plot::HLine::new(name, f64::from(at)).color(colour).width(1.0).id(("mark", index));
-            plot.hline(line.style(egui_plot::LineStyle::dashed_loose()).allow_hover(false));
-            if f64::from(at) < full {
-                // "speaks" and "beats" are neighbours: one below its line, one above, where the chart has room above.
-                let is_high = (full - f64::from(at)) / full * f64::from(height) < f64::from(WORD_HEIGHT);
-                let anchor = if name == "speaks" || is_high { Align2::LEFT_TOP } else { Align2::LEFT_BOTTOM };
-                chart::word(plot, [-seconds, f64::from(at)], anchor, &format!(" {name}"), colour);
-            }
-        }
-        let points = track.kpa.iter().enumerate();
-        let points = points.map(|(n, &kpa)| [f64::from(track.step_s) * n as f64 - seconds, f64::from(kpa)]);
+        let marks: Vec<_> = track.marks.iter().map(|marks| breath_meter::named(marks, c)).collect();
+        draw_marks(plot, &marks, time, (full, f64::from(height)));
+        let points = track.kpa.iter().enumerate().map(|(n, &kpa)| [time(n), f64::from(kpa)]);
         plot.line(chart::curve(points.collect(), c.breath, 2.0).fill(0.0).fill_alpha(0.15).id("breath"));
     });
+}
+
+/// Lines of the marks at each time: notes have different ones, and some notes lack some. Words are where a line begins first.
+fn draw_marks(
+    plot: &mut egui_plot::PlotUi<'_>,
+    marks: &[[NamedMark; 4]],
+    time: impl Fn(usize) -> f64,
+    (full, height): (f64, f64),
+) {
+    for mark in 0..4 {
+        let has = |n: &usize| marks[*n][mark].0.is_some();
+        let times: Vec<usize> = (0..marks.len()).collect();
+        let stretches = times.chunk_by(|a, b| has(a) == has(b)).filter(|times| times.iter().all(has));
+        for (index, times) in stretches.enumerate() {
+            let at = |&n: &usize| Some([time(n), f64::from(marks[n][mark].0?)]);
+            let points: Vec<[f64; 2]> = times.iter().filter_map(at).collect();
+            let ((_, name, colour), first) = (marks[times[0]][mark], points[0]);
+            let line = chart::curve(points, colour, 1.0).id(("mark", mark, index));
+            plot.line(line.style(egui_plot::LineStyle::dashed_loose()));
+            if index == 0 && first[1] < full {
+                // "speaks" and "beats" are neighbours: one below its line, one above, where the chart has room above.
+                let is_high = (full - first[1]) / full * height < f64::from(WORD_HEIGHT);
+                let is_below = name == "speaks" || is_high;
+                let anchor = if is_below { Align2::LEFT_TOP } else { Align2::LEFT_BOTTOM };
+                chart::word(plot, first, anchor, &format!(" {name}"), colour);
+            }
+        }
+    }
 }
 
 /// A source, with the range it has gone through.

@@ -291,6 +291,8 @@ pub struct Track {
     pub step_s: f32,
     /// Mouth pressure, kPa.
     pub kpa: Vec<f32>,
+    /// The pressures that mattered for the note of that time.
+    pub marks: Vec<PressureMarks>,
     /// Level of the sound, dB over full scale, root mean square.
     pub level_db: Vec<f32>,
     /// Pitch as a MIDI number with its fraction at A4 = 440 Hz; `None` without one.

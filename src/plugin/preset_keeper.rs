@@ -249,6 +249,20 @@ mod tests {
     }
 
     #[test]
+    fn a_preset_leaves_the_transposition_of_the_player() {
+        let params = ChalumeauParams::default();
+        let mine =
+            Preset::parse("format = 1\nname = \"Mine\"\n\n[parameters]\ntransp = \"-2 st\"\nlip = \"0.9\"\n")
+                .unwrap();
+        params.put(&mine);
+        params.put(&factory::all()[5]);
+        let settings = params.settings();
+        let expected = factory::all()[5].settings();
+        assert_eq!(settings.reach.transpose, -2);
+        assert_eq!(settings.lip, expected.lip);
+    }
+
+    #[test]
     fn every_factory_preset_is_the_same_in_plugin_and_command_line() {
         let params = ChalumeauParams::default();
         assert_eq!(params.preset_name(), factory::all()[0].name, "a new instance is the first preset");

@@ -437,7 +437,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let level_db: Vec<f32> = sound.chunks((STEP_S * RATE_HZ) as usize).map(rms_db).collect();
     let pitch = 69.0 + 12.0 * (heard.f0_hz.unwrap_or(440.0) / 440.0).log2();
     let standing = TransferMatrix::new(&model.file, model.air).standing_pressure(wanted_hz, open);
-    Snapshot {
+    let mut snapshot = Snapshot {
         instrument: Arc::new(model.file.clone()),
         silent: model.silent_notes(),
         instruments: INSTRUMENTS.map(String::from).to_vec(),
@@ -454,6 +454,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         history: Track {
             step_s: STEP_S as f32,
             kpa: probes.iter().step_by(every).map(kpa).collect(),
+            marks: Vec::new(),
             pitch: level_db.iter().map(|&db| Some(pitch).filter(|_| db > -50.0)).collect(),
             level_db,
         },
@@ -479,7 +480,9 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         // The plugin's delay at 48 kHz.
         latency_ms: 0.4,
         ..Snapshot::default()
-    }
+    };
+    snapshot.history.marks = vec![snapshot.marks(); snapshot.history.kpa.len()];
+    snapshot
 }
 
 /// Written C4 at half the closing pressure on the reference clarinet.

@@ -124,6 +124,7 @@ mod tests {
         let track = Track {
             step_s: 0.02,
             kpa: Vec::new(),
+            marks: Vec::new(),
             level_db: values.iter().map(|value| value.0).collect(),
             pitch: values.iter().map(|value| value.1).collect(),
         };

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crate::editor::snapshot::Track;
+use crate::editor::snapshot::{PressureMarks, Track};
 use chalumeau_core::units::cents;
 
 /// Length of the history, s.
@@ -13,10 +13,11 @@ const STEP_S: f32 = 0.05;
 /// A longer pause clears the history, whose values would not show when they were.
 const LONGEST_GAP: Duration = Duration::from_secs(2);
 
-/// Mouth pressure, level and pitch at one time.
+/// Mouth pressure and its marks, level and pitch at one time.
 #[derive(Clone, Copy)]
 struct HistoryEntry {
     kpa: f32,
+    marks: PressureMarks,
     level_db: f32,
     pitch: Option<f32>,
 }
@@ -34,10 +35,10 @@ impl BreathHistory {
         Self { entries: VecDeque::new(), latest: Instant::now() }
     }
 
-    /// Adds mouth pressure, kPa, level, dB, and pitch of now for every step since the latest value.
-    pub fn extend(&mut self, kpa: f32, level_db: f32, f0_hz: Option<f32>) {
+    /// Adds mouth pressure, kPa, with its marks, level, dB, and pitch of now for every step since the latest value.
+    pub fn extend(&mut self, kpa: f32, marks: PressureMarks, level_db: f32, f0_hz: Option<f32>) {
         let pitch = f0_hz.map(|f0_hz| 69.0 + 0.01 * cents(f64::from(f0_hz), 440.0) as f32);
-        let entry = HistoryEntry { kpa, level_db, pitch };
+        let entry = HistoryEntry { kpa, marks, level_db, pitch };
         let step = Duration::from_secs_f32(STEP_S);
         if self.latest.elapsed() > LONGEST_GAP {
             *self = Self::new();
@@ -56,6 +57,7 @@ impl BreathHistory {
         Track {
             step_s: STEP_S,
             kpa: self.entries.iter().map(|entry| entry.kpa).collect(),
+            marks: self.entries.iter().map(|entry| entry.marks).collect(),
             level_db: self.entries.iter().map(|entry| entry.level_db).collect(),
             pitch: self.entries.iter().map(|entry| entry.pitch).collect(),
         }

@@ -142,7 +142,7 @@ impl SnapshotThread {
         snapshot.microphone = self.shared.microphone.load();
         snapshot.hears_midi = self.hears_midi(inside.breath_sources.messages());
         let level_db = self.level_db(inside.host_rate_hz);
-        self.history.extend(inside.now.mouth_kpa, level_db, snapshot.heard.f0_hz);
+        self.history.extend(inside.now.mouth_kpa, snapshot.marks(), level_db, snapshot.heard.f0_hz);
         snapshot.history = self.history.track();
         #[cfg(feature = "devices")]
         self.show_knob(&mut snapshot);
