@@ -5,9 +5,9 @@
 #
 #   benches/instructions.sh [RATE]      host rate, default 48000
 #
-# Callgrind counts the second that follows the first half, of a held note, and nothing else. Building the instrument varies from run to
-# run, so it is not part of the count, and the same program gives the same count to a few instructions in a million. Without valgrind it
-# fails: a gate that did not run is not green.
+# Callgrind counts what follows the first half second of a held note, and nothing else. Building the instrument varies from run to run, so it is
+# not part of the count: the same program gives the same count to a few instructions in a million. Without valgrind it fails: a gate that
+# did not run is not green.
 set -euo pipefail
 export LC_ALL=C
 

@@ -831,6 +831,12 @@ fn rubbish_in_a_snapshot_does_no_harm() {
                 let mut snapshot = window.snapshot.borrow_mut();
                 snapshot.mouth_kpa = value;
                 snapshot.history.kpa.fill(value);
+                // Some have all marks, some lack some, and the last are missing.
+                snapshot.history.marks.pop();
+                for (n, marks) in snapshot.history.marks.iter_mut().enumerate() {
+                    marks.speaks_kpa = (n % 3 > 0).then_some(value);
+                    marks.chokes_kpa = (n > 50).then_some(6.0);
+                }
                 snapshot.scope.flow_cm3s.fill(value);
                 snapshot.scope.mouthpiece_kpa.fill(value);
                 snapshot.heard.cents = Some(value);
