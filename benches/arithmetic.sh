@@ -17,9 +17,8 @@ for tool in valgrind objdump; do
 done
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 target=${CARGO_TARGET_DIR:-$root/target}
-(cd "$root" && CARGO_TARGET_DIR=$target CARGO_PROFILE_PLUGIN_STRIP=none \
-    cargo build --quiet --profile plugin -p chalumeau-core --features fit,threads --example instructions)
-program=$target/plugin/examples/instructions
+(cd "$root" && CARGO_TARGET_DIR=$target cargo build --quiet --profile plugin -p chalumeau-benches --bin instructions)
+program=$target/plugin/instructions
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 objdump -d --no-show-raw-insn "$program" >"$folder/program"

@@ -28,10 +28,10 @@ if ! command -v valgrind >/dev/null; then
 fi
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 target=${CARGO_TARGET_DIR:-$root/target}
-# With its symbols: callgrind finds the function by its name.
-(cd "$root" && CARGO_TARGET_DIR=$target cargo rustc --quiet --profile plugin -p chalumeau-core --features fit,threads \
-    --example instructions -- -C strip=none)
-program=$target/plugin/examples/instructions
+# With the features of the bundle, whose core is then not built again.
+(cd "$root" && CARGO_TARGET_DIR=$target cargo build --quiet --profile plugin -p chalumeau -p chalumeau-benches \
+    --no-default-features --features chalumeau/plugin,chalumeau/devices --bin instructions)
+program=$target/plugin/instructions
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 

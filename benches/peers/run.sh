@@ -35,8 +35,8 @@ if ! echo '#include <stk/BlowHole.h>' | "$cxx" -E -x c++ - >/dev/null 2>&1; then
 fi
 # shellcheck disable=SC2086 # flags are words
 "$cxx" -std=c++17 ${CXXFLAGS:--O3} "$here/stk.cpp" -lstk -o "$scratch/stk"
-(cd "$root" && CARGO_TARGET_DIR=$target cargo build --quiet --release -p chalumeau-core --features fit,threads --example instructions)
-ours=$target/release/examples/instructions
+(cd "$root" && CARGO_TARGET_DIR=$target cargo build --quiet --release -p chalumeau-benches --bin instructions)
+ours=$target/release/instructions
 
 names=(chalumeau plain blowhole clarinet) # plain: chalumeau without AVX2
 command_of() { # NAME SECONDS

@@ -2,7 +2,7 @@
 //
 //   stk blowhole|clarinet SECONDS [RATE]
 //
-// The note is sounding B flat 3, the written C4 of crates/core/examples/instructions.rs. The clock is the thread's own CPU time
+// The note is sounding B flat 3, the written C4 of benches/programs/src/bin/instructions.rs. The clock is the thread's own CPU time
 // and starts after the instrument is built; under callgrind the difference of two run lengths does the same.
 
 #include <stk/BlowHole.h>

@@ -51,19 +51,32 @@ const PACKAGE_PACKAGES: &[&str] = &[
 struct Step {
     name: &'static str,
     run: fn() -> Result<()>,
-    /// Keeps one core busy and follows no clock, so that another step may run at the same time.
-    beside: bool,
+    beside: Beside,
+}
+
+/// What may run at the same time as a step, as many as there are cores.
+#[derive(Clone, Copy, PartialEq)]
+enum Beside {
+    Nothing,
+    /// Steps that keep a core busy, as this one does. None of them follows a clock.
+    Busy,
+    /// Steps that follow a clock and leave half a core idle, as this one does.
+    Waiting,
 }
 
 const fn alone(name: &'static str, run: fn() -> Result<()>) -> Step {
-    Step { name, run, beside: false }
+    Step { name, run, beside: Beside::Nothing }
 }
 
 const fn beside(name: &'static str, run: fn() -> Result<()>) -> Step {
-    Step { name, run, beside: true }
+    Step { name, run, beside: Beside::Busy }
 }
 
-/// Two builds serve all steps: one debug build of everything (`programs`) and the bundle. Clippy and documentation only
+const fn waiting(name: &'static str, run: fn() -> Result<()>) -> Step {
+    Step { name, run, beside: Beside::Waiting }
+}
+
+/// Two builds serve all steps: one debug build of everything (`programs`), whose core the wheel has too, and the bundle. Clippy and documentation only
 /// check. A step whose tool is missing fails: a gate that did not run is not green.
 static STEPS: &[Step] = &[
     alone("system packages", packages),
@@ -76,6 +89,9 @@ static STEPS: &[Step] = &[
     alone("clippy, plugin alone", || {
         cargo("clippy -p chalumeau --no-default-features --features plugin -- -D warnings")
     }),
+    // Before them: the wheel has the library with fewer features, which then has to be built again for the others. The library's file, a
+    // plugin, is the same for all features.
+    alone("Python package, wheel", python_wheel),
     alone("tests and programs build", || programs().map(drop)),
     alone("tests", tests::run),
     // The longest first.
@@ -88,14 +104,18 @@ static STEPS: &[Step] = &[
     beside("examples in documentation", || cargo("test --workspace --all-features --doc")),
     beside("documentation", documentation),
     beside("generated files", generated),
+    // The longest first.
+    waiting("torque's ends in clack-host", torque_ends),
+    waiting("knob's command", || tests::run_alone("knob_command")),
+    #[cfg(target_os = "linux")]
+    waiting("MIDI over JACK", jack::test),
+    waiting("device", || tests::run_alone("device")),
     alone("CLAP in clack-host", clap),
     alone("CLAP with allocation checks", clap_checked),
     alone("standalone", standalone),
     // Elsewhere there is neither a JACK nor a display that a test could start.
     #[cfg(target_os = "linux")]
     alone("window", window::test),
-    #[cfg(target_os = "linux")]
-    alone("MIDI over JACK", jack::test),
     #[cfg(target_os = "linux")]
     alone("VST3's window in Ardour", ardour::test),
     // After all that builds: these load the bundle.
@@ -133,7 +153,7 @@ pub fn run(words: &[String]) -> Result<()> {
     }
     let began = Instant::now();
     let mut report = Vec::new();
-    for steps in chosen.chunk_by(|a, b| a.beside && b.beside) {
+    for steps in chosen.chunk_by(|a, b| a.beside == b.beside && a.beside != Beside::Nothing) {
         match steps {
             [step] => report.push(done(step)),
             _ => report.extend(at_once(steps, |step| beside::run(step))),
@@ -251,11 +271,15 @@ const CLAP_TESTS: &[&str] = &[
     "mts_esp",
 ];
 
-/// The bundled CLAP: what it sounds like and takes, how soon torque ends, and what only a release build can tell, as its time to be
-/// scanned.
+/// The bundled CLAP: what it sounds like and takes, and what only a release build can tell, as its time to be scanned.
 fn clap() -> Result<()> {
     let program = &programs()?.program;
-    machine::run(host_tests(&["clap", "knob_stop", "clap_checks"]).env(artefacts::PROGRAM, program))
+    machine::run(host_tests(&["clap", "clap_checks"]).env(artefacts::PROGRAM, program))
+}
+
+/// How soon torque ends, of the bundled CLAP.
+fn torque_ends() -> Result<()> {
+    machine::run(host_tests(&["knob_stop"]).env(artefacts::PROGRAM, &programs()?.program))
 }
 
 /// All other rules on a debug build, where the framework aborts on any allocation while processing.
@@ -293,19 +317,30 @@ fn python_examples() -> Result<()> {
     machine::run(Command::new(&python).arg(tests).env(artefacts::PROGRAM, &programs()?.program))
 }
 
-/// The wheel, built from the sources, installed where nothing else is, and tested. Users get that of the profile for releases, which
-/// takes longer to build.
-fn python_package() -> Result<()> {
+/// The Python with which the wheel is built and tested.
+fn package_python() -> Result<PathBuf> {
     let modules =
         "maturin, pytest, mypy, numpy, pyarrow, distributed, nbformat, nbclient, ipykernel, matplotlib";
-    let python = python("venv-package", modules, PACKAGE_PACKAGES)?;
-    let folder = machine::root().join("python");
+    python("venv-package", modules, PACKAGE_PACKAGES)
+}
+
+/// Builds the wheel from the sources. Users get that of the profile for releases, which takes longer to build.
+fn python_wheel() -> Result<()> {
     let wheels = machine::target().join("wheels");
     // Another version's wheel would be installed beside the new one.
     let _ = fs::remove_dir_all(&wheels);
     let build = ["-m", "maturin", "build", "--profile", "dev", "--out"];
-    machine::run(Command::new(&python).args(build).arg(&wheels).current_dir(&folder))?;
-    let wheel = fs::read_dir(&wheels)?.next().context("maturin left no wheel")??.path();
+    let folder = machine::root().join("python");
+    machine::run(Command::new(package_python()?).args(build).arg(&wheels).current_dir(folder))
+}
+
+/// The wheel of the step before, installed where nothing else is, and tested.
+fn python_package() -> Result<()> {
+    let python = package_python()?;
+    let folder = machine::root().join("python");
+    let wheels = machine::target().join("wheels");
+    let mut built = fs::read_dir(&wheels).context("no wheel is built")?;
+    let wheel = built.next().context("maturin left no wheel")??.path();
     let clean = machine::target().join("venv-clean");
     let system = if cfg!(windows) { "python" } else { "python3" };
     machine::run(Command::new(system).args(["-m", "venv", "--clear"]).arg(&clean))?;

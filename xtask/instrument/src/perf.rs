@@ -1,7 +1,7 @@
 //! `cargo xtask perf`: how the cost of playing grows, as a page in `target/perf`. Too long for `ci`.
 //!
 //! All costs are ratios to one voice at 48 kHz in the same run: instructions, counted by callgrind as the difference of two run lengths,
-//! and thread time. Peers are measured in the same way where they are installed. `crates/core/examples/growth.rs` plays.
+//! and thread time. Peers are measured in the same way where they are installed. `benches/programs/src/bin/growth.rs` plays.
 
 mod limits;
 mod peers;
@@ -36,9 +36,8 @@ pub fn run(args: &[String]) -> Result<()> {
     machine::run(machine::cargo().args([
         "build",
         "--profile=plugin",
-        "--package=chalumeau-core",
-        "--features=fit,threads",
-        "--example=growth",
+        "--package=chalumeau-benches",
+        "--bin=growth",
     ]))?;
     let folder = machine::target().join("perf");
     fs::create_dir_all(&folder)?;

@@ -1,4 +1,4 @@
-//! Steps that keep one core busy and follow no clock run beside each other, each in a process of its own. What a step says
+//! Steps that may run beside each other, each in a process of its own. What a step says
 //! goes to a file in `target/ci` and is printed in one piece when it ends.
 
 use std::fs::{self, File};

@@ -4,14 +4,15 @@
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use super::{at_once, spoken};
 use crate::programs::{TestProgram, programs};
 
 /// Programs that follow a clock (ports, links, the simulated knob in real time) run while nothing else does.
-const BY_THE_CLOCK: &[&str] =
-    &["device", "knob_command", "simulator", "misbehaving", "obedience", "chalumeau_knob"];
+const BY_THE_CLOCK: &[&str] = &["simulator", "misbehaving", "obedience", "chalumeau_knob"];
+/// These follow one, too, and mostly wait. They are steps of their own.
+const APART: &[&str] = &["device", "knob_command"];
 /// Programs that take longest begin first; the others follow in the order of their names.
 const LONG: &[&str] = &[
     "instruments_tuned",
@@ -26,10 +27,11 @@ const LONG: &[&str] = &[
 
 /// The step of `ci`.
 pub fn run() -> Result<()> {
-    let all: Vec<_> = programs()?.tests.iter().filter(|test| !test.needs_host()).collect();
-    for &name in BY_THE_CLOCK.iter().chain(LONG) {
+    let mut all: Vec<_> = programs()?.tests.iter().filter(|test| !test.needs_host()).collect();
+    for &name in BY_THE_CLOCK.iter().chain(APART).chain(LONG) {
         ensure!(all.iter().any(|test| test.name == name), "no test program is called {name}");
     }
+    all.retain(|test| !APART.contains(&test.name.as_str()));
     let (clock, mut others): (Vec<_>, Vec<_>) =
         all.into_iter().partition(|test| BY_THE_CLOCK.contains(&test.name.as_str()));
     others.sort_by_key(|test| LONG.iter().position(|name| *name == test.name).unwrap_or(LONG.len()));
@@ -38,6 +40,13 @@ pub fn run() -> Result<()> {
     let failed: Vec<_> = results.into_iter().filter_map(|result| Some(result.err()?.to_string())).collect();
     ensure!(failed.is_empty(), "{} failed: {}", failed.len(), failed.join(", "));
     Ok(())
+}
+
+/// A step with one of these programs.
+pub fn run_alone(name: &str) -> Result<()> {
+    let test = programs()?.tests.iter().find(|test| test.name == name);
+    let test = test.with_context(|| format!("no test program is called {name}"))?;
+    played(test, &mut command(test))
 }
 
 fn command(test: &TestProgram) -> Command {

@@ -85,7 +85,7 @@ pub(super) fn ours(words: &[String]) -> Player {
 }
 
 pub(super) fn program() -> PathBuf {
-    machine::target().join("plugin/examples").join(format!("growth{}", std::env::consts::EXE_SUFFIX))
+    machine::target().join("plugin").join(format!("growth{}", std::env::consts::EXE_SUFFIX))
 }
 
 pub(super) fn measure(words: &[String]) -> Result<Cost> {

@@ -37,6 +37,11 @@ impl<F: Real> Lattice<F> {
     /// the part still to come. A loss filter holds `Y A (1 - q) / q l^2`; a trapezoidal element of conductance G or
     /// resistance R with state s holds `s^2 / 4G`, `s^2 / 4R`. Without sources this never grows while the delay rests.
     pub fn stored_energy(&self, coeffs: &LatticeCoeffs) -> f64 {
+        F::stored_energy(self, coeffs)
+    }
+
+    /// Compiled in this crate, which is optimised where tests are not.
+    pub(super) fn energy(&self, coeffs: &LatticeCoeffs) -> f64 {
         let last = coeffs.ticks.len() - 1;
         let tuned = coeffs.tuned_cell();
         let row = u32::from(self.base) / STRIDE as u32;

@@ -1,6 +1,6 @@
 //! The two number types a lattice can be built of.
 
-use super::{Asked, LEAST_MASK, Lattice, NEXT_MASK, Tip};
+use super::{Asked, LEAST_MASK, Lattice, LatticeCoeffs, NEXT_MASK, Tip};
 
 /// What the lattice computes in: `f32` to play, `f64` to prove.
 pub trait Real:
@@ -28,6 +28,9 @@ pub trait Real:
     /// [`Lattice::run_any`] of this number, which no crate but this one has to compile.
     #[doc(hidden)]
     fn run_any(lattice: &mut Lattice<Self>, samples: usize, tip: &mut dyn Tip<Self>);
+    /// [`Lattice::stored_energy`] of this number, likewise.
+    #[doc(hidden)]
+    fn stored_energy(lattice: &Lattice<Self>, coeffs: &LatticeCoeffs) -> f64;
 }
 
 macro_rules! real {
@@ -57,6 +60,9 @@ macro_rules! real {
                 lattice.in_parts(samples, &mut Asked(tip), |lattice, samples, tip| {
                     run_asked(lattice, samples, tip.0)
                 });
+            }
+            fn stored_energy(lattice: &Lattice<Self>, coeffs: &LatticeCoeffs) -> f64 {
+                lattice.energy(coeffs)
             }
         }
     };

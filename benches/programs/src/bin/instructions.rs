@@ -1,6 +1,6 @@
 //! Holds one note and prints a checksum of its samples, nothing else: the program to count instructions of.
 //!
-//! `cargo run --release -p chalumeau-core --example instructions -- SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places] [PLAYERS] [chord]`
+//! `cargo run --release -p chalumeau-benches --bin instructions -- SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places] [PLAYERS] [chord]`
 //!
 //! Written C4 at breath 0.5 of full scale; `plain` keeps off AVX2, a bend is in cents, and `watched` takes pictures of
 //! the inside and copies pictures and sound away, as while the plugin's window is open. It is heard from everywhere, or from

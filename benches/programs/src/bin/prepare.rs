@@ -1,6 +1,6 @@
 //! Prepares an instrument from scratch and prints what that took: the program to measure the fit and the tuner with.
 //!
-//! `cargo run --release -p chalumeau-core --features fit,threads --example prepare -- [FILE.toml|b-flat] [RATE] [all|fit|plays]`
+//! `cargo run --release -p chalumeau-benches --bin prepare -- [FILE.toml|b-flat] [RATE] [all|fit|plays]`
 //!
 //! CPU time is that of all threads, where Linux tells it. The checksum is of the prepared instrument: equal sums are equal bits. `plays`
 //! takes the instrument that comes with the program, untuned, and tunes its lowest eight notes: short enough to count instructions of.
