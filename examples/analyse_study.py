@@ -23,7 +23,6 @@ import sys
 
 from study_log import H_REFERENCE, BadInput, Onset, read_log
 from study_measures import by_trial, summarise
-from study_plots import plot_paired, plot_phase, plot_timeline
 from study_questions import ENOUGH_PARTICIPANTS, FAMILY, LEAST_PARTICIPANTS, compare, pairs_of
 
 
@@ -114,6 +113,9 @@ def run(args):
     logs = [read_log(path, log, onset) for log, path in enumerate(args.takes)]
     trials = by_trial([piece for log in logs for piece in log])
     table = summarise(trials, args.least)
+    # Loading matplotlib takes a second: what is wrong with a log is said before.
+    from study_plots import plot_paired, plot_phase, plot_timeline
+
     out = pathlib.Path(args.out)
     try:
         out.mkdir(parents=True, exist_ok=True)

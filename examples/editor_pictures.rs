@@ -51,7 +51,7 @@ fn guide(folder: &Path, size: (f32, f32)) -> Result<(), Box<dyn std::error::Erro
         let kept = WindowState { is_dark, tab, size, ..WindowState::default() };
         let theme = if is_dark { "dark" } else { "light" };
         let path = folder.join(format!("{}-{theme}.png", tab.name().to_lowercase()));
-        let picture = support::picture(&kept, &support::Fake::default(), &snapshot, 1.0);
+        let picture = support::picture(&kept, &support::Fake::linking(), &snapshot, 1.0);
         let picture = image::DynamicImage::ImageRgba8(picture).into_rgb8();
         let encoder =
             PngEncoder::new_with_quality(File::create(&path)?, CompressionType::Best, FilterType::Adaptive);

@@ -192,6 +192,11 @@ impl Parameter {
         ["bsoft", "bloud", "bfrom", "bdead", "transp", "keysw"].contains(&self.id)
     }
 
+    /// Whether it says what a device's controllers do: a preset that does not name it leaves it as the chosen device needs it.
+    pub fn is_of_device(&self) -> bool {
+        ["wheel", "hsrc", "ksrc"].contains(&self.id)
+    }
+
     /// Whether the A/B comparison carries it: what undo carries, and the instrument.
     pub fn is_compared(&self) -> bool {
         self.is_undoable || self.id == "instr"

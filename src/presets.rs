@@ -3,7 +3,7 @@
 //! A preset holds the values that differ from the default, by the ids and texts of the one table of parameters
 //! ([`crate::parameters`]). Choosing it puts every other parameter that belongs to presets to its default, so that a preset
 //! sounds the same whatever was set before. What fits the instrument to a player's hands and devices changes only where a preset names it
-//! ([`Parameter::is_players_own`]). Out of presets stay what acts, arms or plays, and how finely a host renders
+//! ([`Parameter::is_players_own`]), and what a device's controllers do stays as the chosen device needs it ([`Parameter::is_of_device`]). Out of presets stay what acts, arms or plays, and how finely a host renders
 //! ([`Parameter::is_in_presets`]).
 //!
 //! - `file`: the text of a preset, read and written
@@ -22,6 +22,7 @@ use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
 
+use crate::controllers::ControllerMap;
 use crate::parameters::{self, PARAMETERS, Parameter, Sets, Value};
 use user_folder::{UserFolder, UserPresets};
 
@@ -82,12 +83,19 @@ impl Preset {
         own.map_or_else(|| parameter.default_value(), |(_, value)| *value)
     }
 
-    /// Every parameter that this preset sets, with its value; of the player's own only those that it names.
-    pub fn all_values(&self) -> impl Iterator<Item = (&'static Parameter, Value)> {
+    /// Every parameter that this preset sets for the player of a device, with its value; of the player's own only those that it names.
+    pub fn all_values(
+        &self,
+        device: Option<&'static ControllerMap>,
+    ) -> impl Iterator<Item = (&'static Parameter, Value)> {
         let is_named = |parameter: &Parameter| self.values.iter().any(|(named, _)| named.id == parameter.id);
-        Self::parameters()
-            .filter(move |parameter| !parameter.is_players_own() || is_named(parameter))
-            .map(|parameter| (parameter, self.value(parameter)))
+        Self::parameters().filter(move |parameter| !parameter.is_players_own() || is_named(parameter)).map(
+            move |parameter| {
+                let of_device = device.filter(|_| parameter.is_of_device() && !is_named(parameter));
+                let value = of_device.and_then(|device| device.value(parameter));
+                (parameter, value.unwrap_or_else(|| self.value(parameter)))
+            },
+        )
     }
 
     /// The settings of the instrument, as the plugin has them under this preset before any controller moves.
@@ -208,6 +216,7 @@ pub fn checked_name(name: &str) -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::controllers;
 
     #[test]
     fn a_preset_keeps_what_differs_and_nothing_else() {
@@ -240,7 +249,8 @@ mod tests {
 
     #[test]
     fn a_preset_leaves_the_players_own_unless_it_names_it() {
-        let sets = |preset: &Preset, id: &str| preset.all_values().any(|(parameter, _)| parameter.id == id);
+        let sets =
+            |preset: &Preset, id: &str| preset.all_values(None).any(|(parameter, _)| parameter.id == id);
         let own: Vec<_> = PARAMETERS.iter().filter(|parameter| parameter.is_players_own()).collect();
         assert_eq!(own.len(), 6);
         assert!(own.iter().all(|parameter| parameter.is_in_presets()));
@@ -251,6 +261,31 @@ mod tests {
         let mine =
             Preset::parse("format = 1\nname = \"Mine\"\n\n[parameters]\ntransp = \"-2 st\"\n").unwrap();
         assert!(sets(&mine, "transp") && !sets(&mine, "bsoft"));
+    }
+
+    #[test]
+    fn a_preset_leaves_controllers_to_the_device_unless_it_names_them() {
+        let value = |preset: &str, device: Option<&str>, id: &str| {
+            let device = device.map(|name| controllers::factory::find(name).unwrap());
+            let preset = factory::find(preset).unwrap();
+            let values: Vec<_> = preset.all_values(device).collect();
+            values
+                .into_iter()
+                .find(|(parameter, _)| parameter.id == id)
+                .map(|(p, value)| p.text(value))
+                .unwrap()
+        };
+        let usual = parameters::find("wheel").unwrap().default_text();
+        for (preset, device, id, wanted) in [
+            ("Glass facing", None, "wheel", usual.as_str()),
+            ("Glass facing", Some("EWI"), "wheel", "Nothing"),
+            ("Glass facing", Some("WARBL"), "wheel", usual.as_str()),
+            ("Glass facing", Some("MPE keyboard"), "hsrc", "CC74 (MPE y)"),
+            ("Glass facing", Some("Keys only"), "vib", "0.0 %"),
+            ("Flutter cabaret", Some("EWI"), "wheel", "Flutter"),
+        ] {
+            assert_eq!(value(preset, device, id), wanted, "{preset}, {device:?}, {id}");
+        }
     }
 
     #[test]
@@ -268,7 +303,7 @@ mod tests {
 
     #[test]
     fn a_mistyped_name_is_near_and_another_word_is_not() {
-        let names = ["Soft subtone", "Klezmer dance", "Deep bass"];
+        let names = ["Soft subtone", "Klezmer dance", "Glass facing"];
         assert_eq!(nearest("soft subtown", names), Some("Soft subtone"));
         assert_eq!(nearest("klezmer", names), Some("Klezmer dance"));
         assert_eq!(nearest("xyzzy", names), None);

@@ -217,7 +217,9 @@ fn names_do_not_break_tables_and_pictures() {
         .replace("part = \"cylinder\"", "part = \"a,\\\"b\\\"\"")
         .replace("\"R3\"", "\"H,1\"");
     fs::write(d.path().join("odd.toml"), odd).unwrap();
-    let bore = succeeds(d.path(), "bore --instrument odd.toml --plot odd.svg");
+    let bore = succeeds(d.path(), "bore --instrument odd.toml --csv - --plot odd.svg");
+    let only_drawn = succeeds(d.path(), "bore --instrument odd.toml --plot only.svg");
+    assert!(only_drawn.is_empty() && d.path().join("only.svg").exists(), "{only_drawn}");
     assert!(bore.lines().nth(1).unwrap().starts_with("# a b"), "{bore}");
     assert!(bore.contains("bore,\"a,\"\"b\"\"\",0,") && bore.contains("hole,\"H,1\","), "{bore}");
     let show = succeeds(d.path(), "instrument show odd.toml");
@@ -553,6 +555,12 @@ fn a_limiter_that_worked_and_an_instrument_that_reaches_are_told() {
         said("--written C4 --gamma 0.2").contains(soft) && said("--sounding Bb3 --gamma 0.2").contains(soft)
     );
     assert!(!said("--written C4 --breath ramp:0:0.4:1").contains("warning"));
+    let output = chalumeau(d.path(), ["render", MELODY, "--gamma", "0.2", "--force", "--out", "x.wav"]);
+    let late = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        late.contains(" more) begins to sound at gamma 0.") && late.contains(": only air is heard"),
+        "{late}"
+    );
     let output = chalumeau(d.path(), ["render", KING, "--force", "--out", "x.wav"]);
     let low = String::from_utf8(output.stderr).unwrap();
     assert!(low.contains("notes have no fingering") && low.contains("; --instrument bass has them"), "{low}");

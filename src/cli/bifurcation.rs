@@ -65,7 +65,7 @@ impl BifurcationCommand {
         let curve = BreathCurve::swell(self.to as f32, self.seconds);
         let settings = self.settings.blown_by(None, &curve, &file)?;
         let plot = self.plot.open(self.table.force())?;
-        let mut table = self.table.open("direction,gamma,rms,shut")?;
+        let mut table = self.table.open_beside(&plot, "direction,gamma,rms,shut")?;
         let threshold = linear_threshold(&file, written, &settings);
         let name = file.name.clone();
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;

@@ -41,7 +41,7 @@ impl BoreCommand {
         let file = self.instrument.load()?;
         let fingering = self.fingering(&file)?;
         let plot = self.plot.open(self.table.force())?;
-        let mut table = self.table.open("kind,name,x_mm,diameter_mm,chimney_mm,open")?;
+        let mut table = self.table.open_beside(&plot, "kind,name,x_mm,diameter_mm,chimney_mm,open")?;
         table.comment(format_args!("{}; mm from the tip of the reed", file.name))?;
         let mut last = None;
         for segment in &file.bore {

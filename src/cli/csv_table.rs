@@ -2,6 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::files::{self, MaybeFile};
+use crate::cli::plot_args::Plot;
 use crate::output::NewFile;
 use clap::Args;
 use std::borrow::Cow;
@@ -28,9 +29,9 @@ const OTHERS: [(&str, &str); 11] = [
 /// Where a table goes.
 #[derive(Args)]
 pub struct TableArgs {
-    /// Where to write the table; - is standard output
-    #[arg(long, value_name = "FILE", default_value = "-")]
-    csv: PathBuf,
+    /// Where to write the table; - is standard output [default: -, and nowhere where only a figure is drawn]
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
     /// Replace an existing file
     #[arg(long)]
     force: bool,
@@ -39,12 +40,12 @@ pub struct TableArgs {
 impl TableArgs {
     /// Whether the table goes to a file.
     pub fn to_file(&self) -> bool {
-        self.csv != Path::new("-")
+        self.csv.as_ref().is_some_and(|path| path != Path::new("-"))
     }
 
     /// Where it goes, for [`files`].
     pub fn path(&self) -> MaybeFile<'_> {
-        Some(&self.csv)
+        self.csv.as_deref()
     }
 
     /// Refuses names of the table and of other results that cannot be meant, before anything is measured. `read` is what the
@@ -56,11 +57,12 @@ impl TableArgs {
 
     /// Refuses a name by which the table would be taken for something else.
     fn check_name(&self) -> Result<(), Failure> {
-        let ending = self.csv.extension().unwrap_or_default().to_ascii_lowercase();
+        let Some(path) = &self.csv else { return Ok(()) };
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         match OTHERS.iter().find(|(other, _)| ending == *other) {
             Some((_, what)) => Err(Failure::Usage(format!(
                 "--csv {}: a file of this name would be {what}; a table is called .csv or .txt",
-                self.csv.display()
+                path.display()
             ))),
             None => Ok(()),
         }
@@ -73,14 +75,20 @@ impl TableArgs {
 
     pub fn open(&self, header: &str) -> Result<CsvTable, Failure> {
         self.check_name()?;
-        CsvTable::open(&self.csv, self.force, header)
+        CsvTable::open(self.csv.as_deref().unwrap_or(Path::new("-")), self.force, header)
+    }
+
+    /// The table beside a figure, which is all that is wanted where the figure alone has a file.
+    pub fn open_beside(&self, plot: &Plot, header: &str) -> Result<CsvTable, Failure> {
+        let only_figure = plot.wanted() && self.csv.is_none();
+        if only_figure { Ok(CsvTable { sink: Sink::Nobody }) } else { self.open(header) }
     }
 }
 
 enum Sink {
     Stdout(BufWriter<StdoutLock<'static>>),
     File(NewFile),
-    /// Its reader has seen enough. The other results of the command are still wanted.
+    /// Nobody wants it, or its reader has seen enough. The other results of the command are still wanted.
     Nobody,
 }
 

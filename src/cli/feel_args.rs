@@ -184,6 +184,7 @@ pub fn refused_in_flags(refused: FeelRefused, ceiling: &str, has_reed: bool) -> 
         FeelRefused::Push { .. } => {
             "lower the mark (--detent) or --torque, lengthen --travel, or take --law pressure".to_owned()
         }
+        FeelRefused::Field { .. } => "lower --torque, --contrast or --place, or lengthen --travel".to_owned(),
         _ => return refused.into(),
     };
     Failure::Usage(format!("{}; {helps}", refused.reason()))

@@ -18,7 +18,6 @@ use chalumeau_core::reed::ReedTables;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::felt::{AtContrast, Torque, few, torques};
-use chalumeau_knob::touch::feel::NO_MOTOR;
 use clap::Args;
 
 /// Step of the curve, degrees: one of the knob's encoder.
@@ -134,7 +133,7 @@ impl FeltReedArgs {
         let (bore, reed) = self.bore_and_reed(file)?;
         let fingering = note.and_then(|note| bore.written().position(|written| written == note));
         let feel = match fingering {
-            Some(fingering) => FeelTable::new(&bore, &design, &reed, &NO_MOTOR)
+            Some(fingering) => FeelTable::unlimited(&bore, &design, &reed)
                 .and_then(|table| table.accepts(fingering, &design, &limits).map(|()| table)),
             None => FeelTable::new(&bore, &design, &reed, &limits),
         };
@@ -155,10 +154,11 @@ impl HapticCommand {
         let plot = self.plot.open(self.table.force())?;
         let wanted = |feel: &&NoteFeel| notes.contains(&feel.written);
         if self.curve {
-            feel.notes().iter().filter(wanted).try_for_each(|note| self.curve(note))?;
+            feel.notes().iter().filter(wanted).try_for_each(|note| self.curve(note, &plot))?;
             return self.draw(plot, &file, &feel);
         }
-        let mut table = self.table.open(
+        let mut table = self.table.open_beside(
+            &plot,
             "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding",
         )?;
         table.comment(format_args!(
@@ -211,8 +211,8 @@ impl HapticCommand {
         })
     }
 
-    fn curve(&self, note: &NoteFeel) -> Result<(), Failure> {
-        let mut table = self.table.open("angle_deg,torque_mnm")?;
+    fn curve(&self, note: &NoteFeel, plot: &Plot) -> Result<(), Failure> {
+        let mut table = self.table.open_beside(plot, "angle_deg,torque_mnm")?;
         let a = note.landmarks;
         table.comment(format_args!(
             "written {} ({}): threshold {:.2}, beating {:.2}, closure {:.2}, extinction {:.2}, wall {:.2} degrees",

@@ -164,7 +164,7 @@ impl ImpedanceCommand {
         };
         let plot = self.plot.open(self.table.force())?;
         let bore = self.bore(&file)?;
-        let mut table = self.table.open(header)?;
+        let mut table = self.table.open_beside(&plot, header)?;
         table.comment(format_args!("{about}"))?;
         for fingering in notes.iter().filter_map(|&written| file.fingering(written)) {
             if let Some(count) = self.peaks {

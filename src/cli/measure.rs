@@ -83,7 +83,7 @@ impl MeasureCommand {
         let plot = self.plot.open(self.table.force())?;
         let harmonics: Vec<_> = (1..=HARMONICS).map(|n| format!("h{n}_db")).collect();
         let columns = "start_s,end_s,sounding_midi,name,f_hz,cents,level_dbfs,t90_s,centroid_hz";
-        let mut table = self.table.open(&format!("{columns},{}", harmonics.join(",")))?;
+        let mut table = self.table.open_beside(&plot, &format!("{columns},{}", harmonics.join(",")))?;
         let spinner = waiting("finding the notes");
         let (notes, track) = recording::notes(&sound.samples, f64::from(sound.rate));
         spinner.finish_and_clear();

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Whether a figure is drawn, and into which file. The command's `--force` decides about existing files.
 #[derive(Args)]
 pub struct PlotArgs {
-    /// Also draw a figure: a new .png or .svg file, or .json for its data
+    /// Draw a figure: a new .png or .svg file, or .json for its data
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Size of the figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]. In a smaller figure,
@@ -58,7 +58,10 @@ impl Plot {
                 if let Some(warning) = sheet.too_small_for(&figure) {
                     say!("warning: {warning}");
                 }
-                Ok(sheet.draw(&figure)?)
+                let path = sheet.path().to_owned();
+                sheet.draw(&figure)?;
+                say!("{}: drawn", path.display());
+                Ok(())
             }
             None => Ok(()),
         }

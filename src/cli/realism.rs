@@ -103,7 +103,7 @@ impl RealismCommand {
         settings.gain_db -= HEADROOM_DB as f32;
         settings.reach = Reach::default();
         let plot = self.plot.open(self.table.force())?;
-        let mut table = self.table.open(&header())?;
+        let mut table = self.table.open_beside(&plot, &header())?;
         let name = with_preset(&file.name, self.preset.as_ref());
         if file.transposition != Bundled::BFlat.file().transposition {
             say!("warning: the recordings are of a B flat clarinet");

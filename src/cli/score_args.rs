@@ -20,7 +20,7 @@ use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::control::parts::Unplayed;
-use chalumeau_core::event::{PartEvent, Timed};
+use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::haptics::{FeelDesign, RequirementSolver};
 use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::instrument::key_pitches::{KeyPitches, TRIM_MOST_CENTS};
@@ -34,7 +34,7 @@ use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMappin
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -283,7 +283,7 @@ impl ScoreArgs {
         self.preset.as_ref().map(Preset::to_text)
     }
 
-    /// Says which notes of the command line begin above all that a curve of gamma reaches. Works out the whole bore, so a batch does not
+    /// Says which notes begin above all that a curve of gamma reaches. Works out the whole bore, so a batch does not
     /// ask.
     pub fn too_little_breath(&self) -> Option<String> {
         let curve = self.breath.curve(self.midi.is_some()).ok()??;
@@ -291,29 +291,29 @@ impl ScoreArgs {
         if reaches >= ALL_BEGIN {
             return None;
         }
-        let Planned { file, settings, .. } = self.plan().ok()?;
-        let of_sounding = |note: u8| SoundingNote(note).written(file.transposition).map(|note| note.0);
-        let notes = match (self.scale, self.written.or_else(|| of_sounding(self.sounding?))) {
-            (Some((from, to)), _) => from.min(to)..=from.max(to),
-            (None, note) => note.map(|note| note..=note)?,
-        };
+        let Planned { file, settings, parts, .. } = self.plan().ok()?;
+        let struck = parts.events.iter().filter_map(|timed| match timed.event.event {
+            Event::NoteOn { note, .. } => note.written(file.transposition),
+            _ => None,
+        });
+        let notes: BTreeSet<WrittenNote> = struck.collect();
         if settings.breath_response != BreathResponse::Physical {
             return None;
         }
         let a4_hz = f64::from(settings.a4_hz);
         let bore = RequirementSolver::new(&file, Air::at(f64::from(settings.temperature_c)), a4_hz).ok()?;
         let reed = played_reed(&file, a4_hz, &settings);
-        let begin = |note: u8| {
-            let fingering = bore.written().position(|written| written == WrittenNote(note))?;
+        let begin = |note: WrittenNote| {
+            let fingering = bore.written().position(|written| written == note)?;
             Some((note, bore.note(fingering, &reed)?.gamma_sounding))
         };
-        let mut late = notes.filter_map(begin).filter(|&(_, gamma)| reaches < MODELS_APART * gamma);
+        let mut late =
+            notes.into_iter().filter_map(begin).filter(|&(_, gamma)| reaches < MODELS_APART * gamma);
         let (note, gamma) = late.next()?;
         let others = late.count();
         let others = if others > 0 { format!(" (and {others} more)") } else { String::new() };
         Some(format!(
-            "{}{others} begins to sound at gamma {gamma:.2}, and the breath reaches {}: only air is heard",
-            WrittenNote(note),
+            "{note}{others} begins to sound at gamma {gamma:.2}, and the breath reaches {}: only air is heard",
             curve.gamma_max()
         ))
     }

@@ -337,7 +337,7 @@ impl AirArg {
 #[derive(Args)]
 #[group(id = "notes", multiple = false)]
 pub struct NotesArg {
-    /// Every note of the fingering chart: the default, except for a curve, which is of one note
+    /// Every note of the fingering chart: the default, except where one note is needed, as for a curve
     #[arg(long)]
     all: bool,
     /// One written note: a MIDI number (65) or a name (F4)

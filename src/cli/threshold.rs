@@ -55,7 +55,7 @@ impl ThresholdCommand {
         let notes = self.notes.notes(&file)?;
         let model = TransferMatrix::new(&file, self.air.air());
         let plot = self.plot.open(self.table.force())?;
-        let mut table = self.table.open("written_midi,gamma_on")?;
+        let mut table = self.table.open_beside(&plot, "written_midi,gamma_on")?;
         table.comment(format_args!("{}; quasi-static reed, zeta {}", file.name, self.zeta))?;
         // Height of the peak each note plays on: the same for every embouchure.
         let heights: Vec<(u8, Option<f64>)> = notes

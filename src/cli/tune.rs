@@ -104,7 +104,8 @@ impl TuneCommand {
         let rate = self.rate;
         let name = with_preset(&file.name, self.preset.as_ref());
         let plot = self.plot.open(self.table.force())?;
-        let mut table = self.table.open("written_midi,f_hz,cents,register_ok,as_built_cents")?;
+        let mut table =
+            self.table.open_beside(&plot, "written_midi,f_hz,cents,register_ok,as_built_cents")?;
         table.comment(format_args!(
             "{name}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
             settings.a4_hz

@@ -46,13 +46,16 @@ pub fn find(name: &str) -> Option<&'static ControllerMap> {
 
 /// Every parameter that one of them sets, as `map` has it: a device that is chosen takes back what another one set.
 pub fn values(map: &ControllerMap) -> Vec<(&'static Parameter, Value)> {
-    let of = |map: &ControllerMap, parameter: &Parameter| {
-        map.values.iter().find(|(other, _)| *other == parameter).map(|(_, value)| *value)
-    };
     let is_set =
-        |parameter: &&Parameter| all().iter().chain([map]).any(|other| of(other, parameter).is_some());
-    let value = |parameter| (parameter, of(map, parameter).unwrap_or_else(|| parameter.default_value()));
+        |parameter: &&Parameter| all().iter().chain([map]).any(|other| other.value(parameter).is_some());
+    let value = |parameter| (parameter, map.value(parameter).unwrap_or_else(|| parameter.default_value()));
     PARAMETERS.iter().filter(is_set).map(value).collect()
+}
+
+/// Whether the value that `is_now` recognises is one that the player has found: neither the default nor any device's.
+pub fn is_players(parameter: &Parameter, is_now: impl Fn(Value) -> bool) -> bool {
+    let of_devices = all().iter().filter_map(|map| map.value(parameter));
+    parameter.is_players_own() && !of_devices.chain([parameter.default_value()]).any(is_now)
 }
 
 #[cfg(test)]

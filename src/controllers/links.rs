@@ -3,6 +3,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use super::factory;
 use super::map::{ControllerMap, ParameterLink};
 use crate::parameters::{PARAMETERS, Parameter};
 use chalumeau_core::control::midi::links::{Link, MOST, Source};
@@ -24,6 +25,8 @@ pub struct ControllerLinks {
     heard: AtomicU32,
     /// How often the user has changed a link.
     changes: AtomicU32,
+    /// One more than the place in [`factory::all`] of the device that the user has chosen; 0 for none.
+    device: AtomicU32,
 }
 
 /// A link, or none. Its numbers may be of two moments for as long as one is being written.
@@ -99,6 +102,23 @@ impl ControllerLinks {
         }
     }
 
+    /// The device that the user has chosen.
+    pub fn device(&self) -> Option<&'static ControllerMap> {
+        factory::all().get(self.device.load(Ordering::Relaxed).checked_sub(1)? as usize)
+    }
+
+    /// Replaces all links by those of a device, which is remembered if it is one of [`factory::all`].
+    pub fn choose(&self, map: &ControllerMap) {
+        self.remember(map);
+        self.take(&map.links);
+        self.changes.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn remember(&self, map: &ControllerMap) {
+        let place = factory::all().iter().position(|other| other.name == map.name);
+        self.device.store(place.map_or(0, |place| 1 + place as u32), Ordering::Relaxed);
+    }
+
     /// Replaces all links; whether any has changed.
     fn take(&self, links: &[ParameterLink]) -> bool {
         let mut has_changed = false;
@@ -148,16 +168,20 @@ impl ControllerLinks {
         }
     }
 
-    /// The text of a [`ControllerMap`] with these links; empty without any.
+    /// The text of a [`ControllerMap`] with these links and the name of the chosen device; empty without either.
     pub fn to_text(&self) -> String {
         let links: Vec<ParameterLink> = self.all().into_iter().map(|(link, _)| link).collect();
-        let map = ControllerMap { name: "Links".to_owned(), links, ..ControllerMap::default() };
-        if map.links.is_empty() { String::new() } else { map.to_text() }
+        let device = self.device();
+        let name = device.map_or("Links", |device| &device.name).to_owned();
+        let map = ControllerMap { name, links, ..ControllerMap::default() };
+        if map.links.is_empty() && device.is_none() { String::new() } else { map.to_text() }
     }
 
-    /// Takes the links of a saved text; none where it cannot be read.
+    /// Takes links and device of a saved text; none where it cannot be read.
     pub fn take_text(&self, text: &str) {
-        self.take(&ControllerMap::parse(text).unwrap_or_default().links);
+        let map = ControllerMap::parse(text).unwrap_or_default();
+        self.remember(&map);
+        self.take(&map.links);
     }
 }
 
@@ -215,5 +239,21 @@ mod tests {
         assert_eq!((other.all(), mended(text.clone())), (links.all(), text));
         other.take_text("rubbish");
         assert!(other.all().is_empty() && mended("rubbish".to_owned()).is_empty());
+    }
+
+    #[test]
+    fn a_project_keeps_its_device() {
+        let (links, other) = (ControllerLinks::default(), ControllerLinks::default());
+        for map in factory::all() {
+            let before = links.changes();
+            links.choose(map);
+            assert_eq!((links.device(), links.changes()), (Some(map), before + 1));
+            let text = links.to_text();
+            assert_eq!(mended(text.clone()), text);
+            other.take_text(&text);
+            assert_eq!((other.device(), other.all()), (Some(map), links.all()));
+        }
+        links.choose(&ControllerMap { name: "Any".to_owned(), ..ControllerMap::default() });
+        assert_eq!((links.device(), links.to_text().as_str()), (None, ""));
     }
 }

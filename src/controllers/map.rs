@@ -161,6 +161,11 @@ pub fn as_links(links: &[ParameterLink], settings: &Settings) -> [Option<Link>; 
 }
 
 impl ControllerMap {
+    /// What it sets a parameter to; `None` where the device needs nothing.
+    pub fn value(&self, parameter: &Parameter) -> Option<Value> {
+        self.values.iter().find(|(other, _)| *other == parameter).map(|(_, value)| *value)
+    }
+
     /// Reads the text of a map. What is not known is refused with its line: a map is never half applied.
     pub fn parse(text: &str) -> Result<Self, MapError> {
         let refuse = |offset: usize, what: String| {

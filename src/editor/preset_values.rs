@@ -1,12 +1,14 @@
 //! A preset and the controls: putting one on, making one of them, and whether they differ.
 
+use crate::controllers::{ControllerLinks, ControllerMap};
 use crate::editor::Action;
 use crate::editor::controls::{Controls, Hands, SAME};
 use crate::presets::Preset;
 
 /// Puts a preset on the controls in place of the one called `before`, as one step of undo, and says so.
 pub fn choose(preset: &Preset, before: &str, hands: &mut Hands, actions: &mut Vec<Action>) {
-    let wanted = preset.all_values().map(|(parameter, value)| (parameter.id, parameter.normalized(value)));
+    let values = preset.all_values(device(hands.controls));
+    let wanted = values.map(|(parameter, value)| (parameter.id, parameter.normalized(value)));
     let is_moved = |&(id, value): &(&'static str, f32)| {
         hands.controls.look(id).is_some_and(|look| (look.value - value).abs() > SAME)
     };
@@ -15,17 +17,26 @@ pub fn choose(preset: &Preset, before: &str, hands: &mut Hands, actions: &mut Ve
     actions.push(Action::ChosePreset(preset.name.clone()));
 }
 
-/// A preset of the controls as they are.
+/// The device whose controllers the player has.
+fn device(controls: &dyn Controls) -> Option<&'static ControllerMap> {
+    controls.links().and_then(ControllerLinks::device)
+}
+
+/// A preset of the controls as they are, without what is the player's own and what the device needs: it is for other players, too.
 pub fn capture(name: &str, controls: &dyn Controls) -> Preset {
+    let device = device(controls);
     Preset::of(name, |parameter| {
         let look = controls.look(parameter.id)?;
-        parameter.read(&controls.text(parameter.id, look.value)).ok()
+        let value = parameter.read(&controls.text(parameter.id, look.value)).ok()?;
+        let is_of_device =
+            parameter.is_of_device() && device.and_then(|map| map.value(parameter)) == Some(value);
+        (!parameter.is_players_own() && !is_of_device).then_some(value)
     })
 }
 
 /// Whether a control no longer says what the preset set.
 pub fn is_changed(preset: &Preset, controls: &dyn Controls) -> bool {
-    preset.all_values().any(|(parameter, value)| {
+    preset.all_values(device(controls)).any(|(parameter, value)| {
         controls.look(parameter.id).is_some_and(|look| {
             (look.value - parameter.normalized(value)).abs() > SAME
                 && controls.text(parameter.id, look.value) != parameter.text(value)

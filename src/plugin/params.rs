@@ -425,7 +425,7 @@ impl ChalumeauParams {
     #[allow(unsafe_code)] // the framework's setter
     pub fn put(&self, preset: &Preset) {
         let pointers = self.param_map();
-        for (parameter, value) in preset.all_values() {
+        for (parameter, value) in preset.all_values(self.links.device()) {
             if let Some((_, pointer, _)) = pointers.iter().find(|(id, ..)| id == parameter.id) {
                 // SAFETY: the pointer leads into `self`, and the setter stores atomics. The framework keeps it for its
                 // wrappers because a host would not be told; `values_changed` is how it is told.

@@ -48,7 +48,7 @@ fn the_notes_of_a_recording_are_those_that_were_played() {
         })
         .collect();
     succeeds(d.path(), &format!("render {MELODY} --out melody.wav"));
-    let table = succeeds(d.path(), "measure melody.wav --plot melody.svg");
+    let table = succeeds(d.path(), "measure melody.wav --csv - --plot melody.svg");
     let rows: Vec<Vec<&str>> = table
         .lines()
         .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))

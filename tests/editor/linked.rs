@@ -72,6 +72,7 @@ fn a_device_brings_its_links_and_values_and_the_next_takes_them_back() {
         window.harness.query_by_label_contains("As in a new instance").is_some(),
         "nobody has chosen one"
     );
+    let softest = |window: &Window| window.host.text("bsoft", window.host.value("bsoft"));
     for (device, links_now, wheel) in [
         ("EWI", 1, "Nothing"),
         ("Aerophone", 0, "Growl"),
@@ -85,13 +86,26 @@ fn a_device_brings_its_links_and_values_and_the_next_takes_them_back() {
         window.harness.run();
         assert_eq!(links(&window).len(), links_now, "{device}");
         assert_eq!(window.host.text("wheel", window.host.value("wheel")), wheel, "{device}");
-        window.harness.get_by_label(&chalumeau::controllers::factory::find(device).unwrap().shows);
+        let map = chalumeau::controllers::factory::find(device).unwrap();
+        window.harness.get_by_label(&map.shows);
+        assert_eq!(window.host.links.as_ref().unwrap().device(), Some(map));
+        let least = match device {
+            "Aerophone" => "4.0 %",
+            "Breath controller" => "5.0 %",
+            _ => "3.1 %",
+        };
+        assert_eq!(softest(&window), least, "{device}");
     }
+    // What Calibrate has found is the player's.
+    window.host.automate("bsoft", 0.11);
+    let found = softest(&window);
+    window.harness.run();
     window.harness.get_by_role_and_label(Role::ComboBox, "Choose a device").click();
     window.harness.run();
     window.harness.get_by_label("Any keyboard or controller").click();
     window.harness.run();
     window.harness.get_by_label_contains("As in a new instance");
+    assert_eq!(softest(&window), found);
 }
 
 #[test]

@@ -47,7 +47,8 @@ fn obey(window: &mut Window) -> Vec<Action> {
 /// Whether the host's parameters are those of a preset, by the texts that it shows.
 fn has(window: &Window, preset: &Preset) -> bool {
     let host = &window.host;
-    preset.all_values().all(|(parameter, value)| {
+    let device = host.links.as_ref().and_then(|links| links.device());
+    preset.all_values(device).all(|(parameter, value)| {
         let look = host.look(parameter.id).unwrap();
         let text = host.text(parameter.id, look.value);
         parameter.read(&text).map(|read| parameter.text(read)) == Ok(parameter.text(value))

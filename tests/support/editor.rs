@@ -577,7 +577,7 @@ pub fn pictures(folder: &Path, size: (f32, f32), scales: &[f32], tabs: &[Tab]) {
                 let kept = WindowState { is_dark, tab, size, ..WindowState::default() };
                 let theme = if is_dark { "dark" } else { "light" };
                 let name = format!("{}-{theme}-{:.0}.png", tab.name().to_lowercase(), 100.0 * scale);
-                picture(&kept, &Fake::default(), &snapshot, scale).save(folder.join(&name)).unwrap();
+                picture(&kept, &Fake::linking(), &snapshot, scale).save(folder.join(&name)).unwrap();
                 println!("{}", folder.join(name).display());
             }
         }

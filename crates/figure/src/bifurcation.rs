@@ -73,7 +73,7 @@ impl Ramp {
         for (at, name, colour) in [
             (self.threshold, "linear threshold", Colour::Ink),
             (self.begins, "begins", Colour::Blue),
-            (self.beats, "shuts", Colour::Blue),
+            (self.beats, "beats", Colour::Blue),
             (self.chokes, "chokes", Colour::Blue),
             (self.returns, "returns", Colour::Vermilion),
             (self.ends, "ends", Colour::Vermilion),

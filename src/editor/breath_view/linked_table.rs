@@ -2,13 +2,13 @@
 
 use std::sync::LazyLock;
 
-use egui::{DragValue, Id, RichText, Role, Ui, WidgetInfo};
+use egui::{DragValue, RichText, Role, Ui, WidgetInfo};
 
 use crate::controllers::{ControllerMap, ParameterLink, factory, source_name};
 use crate::editor::controls::{Hands, heading};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
-use crate::parameters::{Kind, Parameter};
+use crate::parameters::{Kind, Parameter, Value};
 
 /// Of the list of devices, points: all of them at once.
 const LIST_HEIGHT: f32 = 320.0;
@@ -25,11 +25,20 @@ static ANY_DEVICE: LazyLock<ControllerMap> = LazyLock::new(|| ControllerMap {
 
 /// Whether parameters and these links are as a device needs them.
 fn is_set(hands: &Hands, links: &[ParameterLink], map: &ControllerMap) -> bool {
-    let near = |parameter: &Parameter, value| {
-        let look = hands.controls.look(parameter.id);
-        look.is_none_or(|look| (look.value - parameter.normalized(value)).abs() < 1e-4)
-    };
-    links == map.links && factory::values(map).into_iter().all(|(parameter, value)| near(parameter, value))
+    links == map.links
+        && factory::values(map)
+            .into_iter()
+            .all(|(parameter, value)| is_at(hands, parameter, value) || is_players(hands, parameter))
+}
+
+/// Whether the player has found a value, as by Calibrate: it fits better than what fits most players.
+fn is_players(hands: &Hands, parameter: &Parameter) -> bool {
+    factory::is_players(parameter, |value| is_at(hands, parameter, value))
+}
+
+fn is_at(hands: &Hands, parameter: &Parameter, value: Value) -> bool {
+    let look = hands.controls.look(parameter.id);
+    look.is_none_or(|look| (look.value - parameter.normalized(value)).abs() < 1e-4)
 }
 
 /// A list of devices; the one that is chosen replaces all links, and sets what devices need.
@@ -40,11 +49,9 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
     heading(ui, "Device");
     let list = egui::ComboBox::from_id_salt("controllers of a device").width(ui.available_width() - 8.0);
     let maps = || std::iter::once(&*ANY_DEVICE).chain(factory::all());
-    // Of those that need the same, the one that was chosen.
-    let last = Id::unique("device that was chosen");
-    let name = ui.data(|data| data.get_temp::<String>(last));
-    let fitting = || maps().filter(|map| is_set(hands, &all, map));
-    let now = fitting().find(|map| Some(&map.name) == name.as_ref()).or_else(|| fitting().next());
+    // Older projects do not say which one was chosen.
+    let fitting = || maps().find(|map| is_set(hands, &all, map));
+    let now = links.device().filter(|map| map.links == all).or_else(fitting);
     let mut chosen = None;
     let text = now.map_or("Choose a device", |map| map.name.as_str());
     let response = list.height(LIST_HEIGHT).selected_text(text).show_ui(ui, |ui| {
@@ -60,10 +67,9 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
         ui.label(RichText::new(&map.shows).font(theme::small()).color(c.quiet));
     }
     let Some(map) = chosen else { return };
-    ui.data_mut(|data| data.insert_temp(last, map.name.clone()));
     links.learn(None);
-    links.replace(&map.links);
-    let values = factory::values(map).into_iter();
+    links.choose(map);
+    let values = factory::values(map).into_iter().filter(|(parameter, _)| !is_players(hands, parameter));
     let values: Vec<_> =
         values.map(|(parameter, value)| (parameter.id, parameter.normalized(value))).collect();
     hands.put_all(&values);

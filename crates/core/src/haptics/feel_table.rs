@@ -87,6 +87,21 @@ impl FeelTable {
         reed: &PlayedReed,
         limits: &TorqueLimits,
     ) -> Result<Self, FeelRefused> {
+        let table = Self::unlimited(bore, design, reed)?;
+        refuse(&table.notes, design, limits)?;
+        Ok(table)
+    }
+
+    /// The same, whatever the notes would ask of a knob; [`accepts`](Self::accepts) checks one of them.
+    ///
+    /// # Errors
+    ///
+    /// [`FeelRefused`] if `design` lies outside its ranges, or if no note (or not the chosen reference note) sounds with this reed.
+    pub fn unlimited(
+        bore: &RequirementSolver,
+        design: &FeelDesign,
+        reed: &PlayedReed,
+    ) -> Result<Self, FeelRefused> {
         design.check()?;
         let (h, k, closing) = (reed.law.h(), reed.law.k(), reed.law.closing());
         if closing > CLOSING_MAX {
@@ -133,7 +148,6 @@ impl FeelTable {
                 note(written, asked, asked.unwrap_or(own), design, reed, (torque, a_on_deg, a_close_deg))
             })
             .collect();
-        refuse(&notes, design, limits)?;
         Ok(Self { notes, reference })
     }
 
