@@ -3,8 +3,8 @@
 //! A preset holds the values that differ from the default, by the ids and texts of the one table of parameters
 //! ([`crate::parameters`]). Choosing it puts every other parameter that belongs to presets to its default, so that a preset
 //! sounds the same whatever was set before. What fits the instrument to a player's hands and devices changes only where a preset names it
-//! ([`Parameter::is_players_own`]), and what a device's controllers do stays as the chosen device needs it ([`Parameter::is_of_device`]). Out of presets stay what acts, arms or plays, and how finely a host renders
-//! ([`Parameter::is_in_presets`]).
+//! ([`Parameter::is_players_own`]), and what a device's controllers do is as the chosen device needs it unless a preset names it
+//! ([`Parameter::is_of_device`]). Out of presets stay what acts, arms or plays, and how finely a host renders ([`Parameter::is_in_presets`]).
 //!
 //! - `file`: the text of a preset, read and written
 //! - `factory`: the presets that come with the program, in the order of MIDI programs
@@ -58,11 +58,17 @@ impl Preset {
         file::to_text(self)
     }
 
-    /// A preset of the values that `look` gives for each parameter; what reads as its default is left out.
-    pub fn of(name: &str, look: impl Fn(&'static Parameter) -> Option<Value>) -> Self {
+    /// A preset of the values that `look` gives for each parameter; what reads as without the preset is left out, for the player of
+    /// a device.
+    pub fn of(
+        name: &str,
+        device: Option<&'static ControllerMap>,
+        look: impl Fn(&'static Parameter) -> Option<Value>,
+    ) -> Self {
         let values = Self::parameters().filter_map(|parameter| {
             let value = look(parameter)?;
-            (parameter.text(value) != parameter.default_text()).then_some((parameter, value))
+            let usual = Self::default().value_for(parameter, device);
+            (parameter.text(value) != parameter.text(usual)).then_some((parameter, value))
         });
         Self { name: name.to_owned(), values: values.collect(), ..Self::default() }
     }
@@ -88,14 +94,19 @@ impl Preset {
         &self,
         device: Option<&'static ControllerMap>,
     ) -> impl Iterator<Item = (&'static Parameter, Value)> {
-        let is_named = |parameter: &Parameter| self.values.iter().any(|(named, _)| named.id == parameter.id);
-        Self::parameters().filter(move |parameter| !parameter.is_players_own() || is_named(parameter)).map(
-            move |parameter| {
-                let of_device = device.filter(|_| parameter.is_of_device() && !is_named(parameter));
-                let value = of_device.and_then(|device| device.value(parameter));
-                (parameter, value.unwrap_or_else(|| self.value(parameter)))
-            },
-        )
+        Self::parameters()
+            .filter(move |parameter| !parameter.is_players_own() || self.names(parameter))
+            .map(move |parameter| (parameter, self.value_for(parameter, device)))
+    }
+
+    fn names(&self, parameter: &Parameter) -> bool {
+        self.values.iter().any(|(named, _)| named.id == parameter.id)
+    }
+
+    /// The value of a parameter under this preset for the player of a device.
+    fn value_for(&self, parameter: &Parameter, device: Option<&ControllerMap>) -> Value {
+        let of_device = device.filter(|_| parameter.is_of_device() && !self.names(parameter));
+        of_device.and_then(|device| device.value(parameter)).unwrap_or_else(|| self.value(parameter))
     }
 
     /// The settings of the instrument, as the plugin has them under this preset before any controller moves.
@@ -220,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_preset_keeps_what_differs_and_nothing_else() {
-        let preset = Preset::of("Mine", |parameter| match parameter.id {
+        let preset = Preset::of("Mine", None, |parameter| match parameter.id {
             "lip" => parameter.read("0.9").ok(),
             // Its text is the default's.
             "stren" => Some(Value::Number(2.501)),
@@ -285,6 +296,24 @@ mod tests {
             ("Flutter cabaret", Some("EWI"), "wheel", "Flutter"),
         ] {
             assert_eq!(value(preset, device, id), wanted, "{preset}, {device:?}, {id}");
+        }
+    }
+
+    #[test]
+    fn a_preset_of_a_devices_player_keeps_what_the_device_would_change() {
+        let ewi = controllers::factory::find("EWI");
+        let (wheel, hsrc) = (parameters::find("wheel").unwrap(), parameters::find("hsrc").unwrap());
+        for (text, is_kept) in [("Nothing", false), ("Vibrato", true), ("Growl", true)] {
+            let look = |parameter: &'static Parameter| match parameter.id {
+                "wheel" => parameter.read(text).ok(),
+                _ => Some(parameter.default_value()),
+            };
+            let mine = Preset::of("Mine", ewi, look);
+            assert_eq!(mine.changes().iter().any(|(parameter, _)| *parameter == wheel), is_kept, "{text}");
+            let read = Preset::parse(&mine.to_text()).unwrap();
+            let values: Vec<_> = read.all_values(ewi).collect();
+            assert!(values.contains(&(wheel, wheel.read(text).unwrap())), "{text}");
+            assert!(values.contains(&(hsrc, hsrc.default_value())), "{text}");
         }
     }
 

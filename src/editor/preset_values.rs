@@ -24,13 +24,9 @@ fn device(controls: &dyn Controls) -> Option<&'static ControllerMap> {
 
 /// A preset of the controls as they are, without what is the player's own and what the device needs: it is for other players, too.
 pub fn capture(name: &str, controls: &dyn Controls) -> Preset {
-    let device = device(controls);
-    Preset::of(name, |parameter| {
-        let look = controls.look(parameter.id)?;
-        let value = parameter.read(&controls.text(parameter.id, look.value)).ok()?;
-        let is_of_device =
-            parameter.is_of_device() && device.and_then(|map| map.value(parameter)) == Some(value);
-        (!parameter.is_players_own() && !is_of_device).then_some(value)
+    Preset::of(name, device(controls), |parameter| {
+        let look = controls.look(parameter.id).filter(|_| !parameter.is_players_own())?;
+        parameter.read(&controls.text(parameter.id, look.value)).ok()
     })
 }
 

@@ -277,7 +277,7 @@ mod tests {
     #[test]
     fn the_users_presets_are_kept_and_failures_are_told() {
         let (_root, params, keeper) = keeper();
-        let (handle, mine) = (keeper.handle(), Preset::of("Mine", |_| None));
+        let (handle, mine) = (keeper.handle(), Preset::of("Mine", None, |_| None));
         handle.send(PresetTask::Save(mine.clone()));
         let shelf = until(handle, |shelf| shelf.is_users("Mine"));
         assert!(shelf.is_users("Mine") && shelf.notice.is_none());
@@ -298,7 +298,7 @@ mod tests {
     fn what_another_window_has_saved_is_replaced_only_by_who_has_seen_it() {
         let (root, _, keeper) = keeper();
         let folder = UserFolder::within(root.path());
-        let (handle, mine) = (keeper.handle(), Preset::of("Mine", |_| None));
+        let (handle, mine) = (keeper.handle(), Preset::of("Mine", None, |_| None));
         let with = |shows: &str| {
             let mut preset = mine.clone();
             preset.shows = shows.to_owned();

@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn every_value_of_every_parameter_survives_the_text() {
         for share in [0.0_f32, 0.37, 1.0] {
-            let preset = Preset::of("All", |parameter| {
+            let preset = Preset::of("All", None, |parameter| {
                 let text = match parameter.kind {
                     Kind::Number(number) => number.text(number.min + share * (number.max - number.min)),
                     Kind::Whole(whole) => whole.text(if share < 0.5 { whole.min } else { whole.max }),

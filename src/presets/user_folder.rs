@@ -248,8 +248,9 @@ mod tests {
     }
 
     fn preset(name: &str) -> Preset {
-        let mut preset =
-            Preset::of(name, |parameter| (parameter.id == "lip").then(|| parameter.read("0.9").unwrap()));
+        let mut preset = Preset::of(name, None, |parameter| {
+            (parameter.id == "lip").then(|| parameter.read("0.9").unwrap())
+        });
         preset.tags = vec!["jazz".to_owned()];
         preset
     }

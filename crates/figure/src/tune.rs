@@ -30,7 +30,7 @@ const IN_TUNE_CENTS: f64 = 5.0;
 pub fn figure(instrument: &str, note: &str, rounds: &[Round], as_built: &Round) -> Figure {
     let mut figure = Figure::new(format!("Intonation: {instrument}")).note(note);
     if !rounds.is_empty() {
-        let what = "As played: natural drifts with the breath as the bore does, tempered is held in tune";
+        let what = "As played: natural is in tune at mezzo-forte, and drifts with the breath; tempered is in tune at every breath";
         figure = figure.panel(panel(what, rounds));
     }
     let what = "As built: what bore and reed do before each note is corrected";

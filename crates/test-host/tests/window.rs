@@ -278,15 +278,17 @@ fn a_hand_on_a_control_is_a_gesture_to_the_host() {
         |_| Vec::new(),
         |told| {
             let mut seen = Vec::new();
-            for (x, y) in grid(size) {
+            // A window that draws slowly takes a quick hand for a click.
+            let paces = [20, 120].map(Duration::from_millis);
+            for (pace, (x, y)) in paces.into_iter().flat_map(|pace| grid(size).map(move |at| (pace, at))) {
                 screen.point(inside, (x, y)).unwrap();
                 screen.press(true).unwrap();
                 for step in 1..=4 {
                     screen.point(inside, (x + 4 * step, y)).unwrap();
-                    std::thread::sleep(Duration::from_millis(20));
+                    std::thread::sleep(pace);
                 }
                 screen.press(false).unwrap();
-                std::thread::sleep(Duration::from_millis(60));
+                std::thread::sleep(3 * pace);
                 open.attend();
                 seen.extend(told.try_iter().flatten());
                 let moved = seen.iter().find_map(|hand| match *hand {
