@@ -29,7 +29,7 @@ const OTHERS: [(&str, &str); 11] = [
 /// Where a table goes.
 #[derive(Args)]
 pub struct TableArgs {
-    /// Where to write the table; - is standard output [default: -, and nowhere where only a figure is drawn]
+    /// Where to write the table; - is standard output [default: -, but with --plot alone there is no table]
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Replace an existing file

@@ -76,8 +76,8 @@ const fn waiting(name: &'static str, run: fn() -> Result<()>) -> Step {
     Step { name, run, beside: Beside::Waiting }
 }
 
-/// Two builds serve all steps: one debug build of everything (`programs`), whose core the wheel has too, and the bundle. Clippy and documentation only
-/// check. A step whose tool is missing fails: a gate that did not run is not green.
+/// Two builds serve all steps: one debug build of everything (`programs`), whose core the wheel has too, and the bundle.
+/// Clippy and documentation only check. A step whose tool is missing fails: a gate that did not run is not green.
 static STEPS: &[Step] = &[
     alone("system packages", packages),
     alone("format", || cargo("fmt --all --check")),
@@ -89,8 +89,8 @@ static STEPS: &[Step] = &[
     alone("clippy, plugin alone", || {
         cargo("clippy -p chalumeau --no-default-features --features plugin -- -D warnings")
     }),
-    // Before them: the wheel has the library with fewer features, which then has to be built again for the others. The library's file, a
-    // plugin, is the same for all features.
+    // Before all that is linked to the library: the wheel builds it with fewer features into the same file, the plugin's, so that
+    // afterwards everything would be built again.
     alone("Python package, wheel", python_wheel),
     alone("tests and programs build", || programs().map(drop)),
     alone("tests", tests::run),
