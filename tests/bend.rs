@@ -131,7 +131,7 @@ fn sweeps(bends: &[f64], seconds: &[f64]) -> Vec<Swept> {
             }
         }
     }
-    each(&some(runs, 2), sweep)
+    each(&some(runs, 3), sweep)
 }
 
 /// A note with a larger error than this has changed its register, cents.

@@ -259,7 +259,7 @@ fn every_instrument_is_passive() {
         for Fitted { coeffs, .. } in &case.fitted {
             let halves = (0..60).map(|_| random.holes(coeffs.holes()));
             let vectors: Vec<Vec<f64>> = case.file.fingerings.iter().map(openings).chain(halves).collect();
-            let vectors = some(vectors, 2);
+            let vectors = some(vectors, 4);
             let answers = parallel::each(&vectors, |opening| {
                 let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
                 let mut f_hz = 20.0;

@@ -15,7 +15,7 @@ use image::{RgbaImage, imageops};
 
 use crate::c4;
 use crate::fingerings::found;
-use crate::some::all_cases;
+use crate::some::{all_cases, some};
 use crate::support::{Fake, picture, shot, things, window};
 
 const SIZES: [(f32, f32); 3] = [(1100.0, 720.0), (700.0, 480.0), (1600.0, 1000.0)];
@@ -147,7 +147,7 @@ fn changed(whole: &RgbaImage, rect: Rect, by: Option<(i64, i64)>) -> Option<(Rgb
 #[test]
 fn every_control_that_moves_or_vanishes_is_seen() {
     let (snapshot, host) = (c4(), Fake::default());
-    for is_dark in [false, true] {
+    for is_dark in some(vec![true, false], 2) {
         for tab in Tab::ALL {
             let kept = WindowState { is_dark, tab, ..WindowState::default() };
             let mut window = window(&kept, &host, &snapshot, 1.0);

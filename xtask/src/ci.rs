@@ -110,19 +110,20 @@ static STEPS: &[Step] = &[
     #[cfg(target_os = "linux")]
     waiting("MIDI over JACK", jack::test),
     waiting("device", || tests::run_alone("device")),
-    alone("CLAP in clack-host", clap),
-    alone("CLAP with allocation checks", clap_checked),
-    alone("standalone", standalone),
     // Elsewhere there is neither a JACK nor a display that a test could start.
     #[cfg(target_os = "linux")]
     alone("window", window::test),
     #[cfg(target_os = "linux")]
     alone("VST3's window in Ardour", ardour::test),
-    // After all that builds: these load the bundle.
+    // After all that builds: these load the plugin, and each keeps one core busy. The longest first.
+    beside("CLAP with allocation checks, rules", || clap_checked(CLAP_RULES)),
+    beside("CLAP with allocation checks, playing", || clap_checked(CLAP_PLAYING)),
     beside("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3", "vst3_rules", "vst3_raw"]))),
     beside("validators", validate::installed),
     beside("VST3 in DawDreamer", dawdreamer),
     beside("VST3 in pedalboard", pedalboard),
+    beside("CLAP in clack-host", clap),
+    beside("standalone", standalone),
 ];
 
 /// Before the whole name of a step, which then runs in this process.
@@ -258,18 +259,9 @@ fn host_tests(names: &[&str]) -> Command {
     command
 }
 
-/// Test files that play the CLAP on a debug build.
-const CLAP_TESTS: &[&str] = &[
-    "clap",
-    "clap_rules",
-    "clap_sleep",
-    "note_ids",
-    "keyboard",
-    "instrument",
-    "microphone",
-    "knob",
-    "mts_esp",
-];
+/// Test files that play the CLAP on a debug build, in two parts that take about as long.
+const CLAP_RULES: &[&str] = &["clap", "clap_rules", "clap_sleep"];
+const CLAP_PLAYING: &[&str] = &["note_ids", "keyboard", "instrument", "microphone", "knob", "mts_esp"];
 
 /// The bundled CLAP: what it sounds like and takes, and what only a release build can tell, as its time to be scanned.
 fn clap() -> Result<()> {
@@ -283,9 +275,9 @@ fn torque_ends() -> Result<()> {
 }
 
 /// All other rules on a debug build, where the framework aborts on any allocation while processing.
-fn clap_checked() -> Result<()> {
+fn clap_checked(names: &[&str]) -> Result<()> {
     let programs = programs()?;
-    let mut tests = host_tests(CLAP_TESTS);
+    let mut tests = host_tests(names);
     tests.env(artefacts::CLAP, &programs.plugin).env(artefacts::PROGRAM, &programs.program);
     machine::run(&mut tests)
 }

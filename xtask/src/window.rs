@@ -31,7 +31,8 @@ pub fn screenshots(_: &[String]) -> Result<()> {
     bundle::run(&[])?;
     let (programs, display) = (programs()?, Display::start()?);
     for (file, name) in PICTURES {
-        machine::run(&mut tests(programs, &display, file, name))?;
+        // In every size and theme.
+        machine::run(tests(programs, &display, file, name).env("CHALUMEAU_ALL_CASES", "1"))?;
     }
     ardour::test()?;
     println!("pictures: {}", machine::target().join(Path::new("screenshots")).display());

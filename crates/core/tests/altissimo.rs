@@ -157,7 +157,7 @@ fn slurs_to_and_from_the_highest_notes_arrive() {
             .chain(down)
             .flat_map(|(from, to)| [20, 44, 78, 112].map(|controller| (from, to, controller)))
             .collect();
-        let cases = some(cases, 3);
+        let cases = some(cases, 5);
         let slur = |at: usize| {
             let (from, to, controller) = cases[at];
             let out = played(&model, controller, &[(0.0, from), (0.6, to)], 1.4);
@@ -223,7 +223,7 @@ fn slurs_from_and_into_the_altissimo_arrive_soon() {
                 .into_iter()
                 .flat_map(|(from, to)| [44, 78, 127].map(|controller| (from, to, controller)))
                 .collect();
-            let cases = some(cases, 3);
+            let cases = some(cases, 5);
             let arrive = |at: usize| arrival_s(&model, cases[at]);
             let found = parallel::each(cases.len(), arrive, &mut |_| ControlFlow::Continue(())).unwrap();
             let mut sorted = found.clone();

@@ -4,6 +4,8 @@
 #[path = "support/live.rs"]
 #[allow(dead_code, reason = "other tests play a knob with it")]
 mod live;
+#[path = "../../core/tests/support/some.rs"]
+mod some;
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -168,9 +170,9 @@ impl Held {
 
 #[test]
 #[ignore = "needs a display"]
-fn a_thousand_openings_leave_nothing_behind() {
-    const CYCLES: usize = 1_000;
+fn many_openings_leave_nothing_behind() {
     const SETTLED: usize = 200;
+    let cycles = if some::all_cases() { 1_000 } else { 500 };
     let screen = screen();
     let mut plugin = plugin();
     let zeta = plugin.param("Embouchure").unwrap();
@@ -184,7 +186,7 @@ fn a_thousand_openings_leave_nothing_behind() {
     };
     let (session, (early, late)) = playing(session, say, |_| {
         let mut early = None;
-        for cycle in 1..=CYCLES {
+        for cycle in 1..=cycles {
             let mut open = Open::new(&screen, &mut plugin);
             open.attend();
             // Most are closed while they are still opening, some when they have drawn.
@@ -204,11 +206,11 @@ fn a_thousand_openings_leave_nothing_behind() {
         (early.unwrap(), Held::settled(&screen))
     });
     plugin.deactivate(session);
-    println!("after {SETTLED}: {early:?}\nafter {CYCLES}: {late:?}");
+    println!("after {SETTLED}: {early:?}\nafter {cycles}: {late:?}");
     assert_eq!(late.threads, early.threads, "threads");
     assert_eq!(late.files, early.files, "open files");
     assert_eq!(late.display, early.display, "what the display holds");
-    let grown = late.resident_kb.saturating_sub(early.resident_kb) / (CYCLES - SETTLED);
+    let grown = late.resident_kb.saturating_sub(early.resident_kb) / (cycles - SETTLED);
     println!("{grown} kB more with each window");
     assert!(grown < KEPT_KB, "{grown} kB more with each window");
 }
@@ -582,7 +584,8 @@ fn every_view_is_drawn_while_a_note_is_played() {
         session,
         |_| std::mem::take(&mut begin),
         |_| {
-            for (zoom, theme) in [(1.0, "dark"), (1.0, "light"), (2.0, "dark"), (2.0, "light")] {
+            let looks = vec![(1.0, "dark"), (1.0, "light"), (2.0, "light"), (2.0, "dark")];
+            for (zoom, theme) in some::some(looks, 2) {
                 let mut seen: Vec<(&str, Picture)> = Vec::new();
                 for view in VIEWS {
                     let state = with_window(&blank, |window| {
