@@ -336,6 +336,7 @@ fn numbers_out_of_range_say_what_would_be_right() {
     refused(&d, "tune --gamma 9", &["must lie in 0..3"]);
     refused(&d, "tune --written 40", &["written 40 (E2) has no fingering"]);
     refused(&d, "threshold --all --zeta 2", &["must lie in 0.05..0.9"]);
+    refused(&d, "threshold C4", &["a note follows its flag: --written C4"]);
     refused(&d, "reed", &["--table"]);
     refused(&d, "reed --law --H 99", &["must lie in 0.5..10"]);
     refused(&d, "hum", &["unrecognized subcommand 'hum'"]);

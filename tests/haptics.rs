@@ -799,13 +799,15 @@ mod command {
             .collect()
     }
 
-    const TABLE: &str = "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding";
+    const TABLE: &str = "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg";
 
     #[test]
     fn table_of_all_notes_and_curve_of_one() {
         let all = rows("haptic --all --zeta 0.3 --contrast 1 --csv -", TABLE);
-        assert_eq!((all.len(), all[0].len(), all[0][0]), (46, 11, 52.0));
+        assert_eq!((all.len(), all[0].len(), all[0][0]), (46, 12, 52.0));
         for row in &all {
+            // The wall of an angle map whose slopes are limited.
+            assert!(row[6] < row[11]);
             assert!((row[3] / (6_000.0 * row[1]) - 1.0).abs() < 1e-5);
             assert!(row[4] < row[6] && row[6] <= row[5] && (row[6] / row[4] - 3.0).abs() < 1e-3);
         }

@@ -30,6 +30,8 @@ use std::sync::Mutex;
 const MANIFEST: &str = "manifest.csv";
 /// The same while it grows, in the order in which files become ready.
 const GROWING: &str = "manifest.part.csv";
+/// What stands between the warnings of a line.
+const BETWEEN_DOUBTS: &str = ";";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -51,7 +53,7 @@ leaves its name out.";
 /// Render many variations into a folder, with a table of what each file is
 ///
 /// Works on all cores, and on each renders up to eight files of one instrument side by side; a file is the same as if it were rendered by itself. If it is stopped, the same command goes on where it was: files that are listed with the same arguments stay
-/// as they are, unless a file or a preset that they are made of has changed. A folder with files of another plan is refused. The table, manifest.csv, has a line for each file: its arguments, length, peak and level.
+/// as they are, unless a file or a preset that they are made of has changed. A folder with files of another plan is refused. The table, manifest.csv, has a line for each file: its arguments, length, peak and level, and what the command warns of: clipped, limited, reset or no_tone.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct BatchCommand {
@@ -94,15 +96,23 @@ struct Job {
 struct Doubtful(BTreeMap<Doubt, Vec<String>>);
 
 impl Doubtful {
-    fn look(&mut self, file: &str, rendered: &Rendered) {
-        for doubt in rendered.doubts() {
-            self.0.entry(doubt).or_default().push(file.to_owned());
+    /// Those of a finished table.
+    fn read(jobs: &[Job], lines: &[Option<String>]) -> Self {
+        let mut found = Self::default();
+        for (job, line) in jobs.iter().zip(lines) {
+            let told = line.as_deref().and_then(|line| line.rsplit(',').next()).unwrap_or_default();
+            for doubt in Doubt::EACH {
+                if told.split(BETWEEN_DOUBTS).any(|id| id == doubt.id()) {
+                    found.0.entry(doubt).or_default().push(job.file.clone());
+                }
+            }
         }
+        found
     }
 
     fn warn(&self) {
         for (doubt, files) in &self.0 {
-            if let Some(first) = files.iter().min() {
+            if let Some(first) = files.first() {
                 let which = if files.len() == 1 { first.clone() } else { format!("{first} and others") };
                 say!("warning: {} ({which}): {}", counted(files.len(), "file"), doubt.text());
             }
@@ -142,7 +152,7 @@ impl BatchCommand {
         }
         fs::create_dir_all(&self.into)
             .map_err(|error| self.failure(&format!("cannot make {}: {error}", self.into.display())))?;
-        let header = format!("file,{},length_s,rate_hz,peak_dbfs,rms_dbfs", plan.names.join(","));
+        let header = format!("file,{},length_s,rate_hz,peak_dbfs,rms_dbfs,warnings", plan.names.join(","));
         let earlier = Earlier::read(&self.into)?;
         if !self.force {
             earlier.check(&self.into, &header, &jobs)?;
@@ -152,10 +162,11 @@ impl BatchCommand {
             if self.force { (vec![None; jobs.len()], 0) } else { earlier.kept(&self.into, &jobs, &inputs) };
         say_what_stays(lines.iter().flatten().count(), changed, jobs.len());
         let journal = self.open_journal(&header, &jobs, &lines, &inputs)?;
-        let doubtful = render_left(&jobs, &mut lines, journal)?;
+        render_left(&jobs, &mut lines, journal)?;
         self.write_manifest(&header, &lines)?;
         say!("{}: {} and {MANIFEST}", self.into.display(), counted(jobs.len(), "file"));
-        doubtful.warn();
+        // Of the files that were there already, too.
+        Doubtful::read(&jobs, &lines).warn();
         if let Some(left_over) = earlier.left_over(&self.into, &jobs) {
             say!("{left_over}");
         }
@@ -295,17 +306,12 @@ impl Journal<'_> {
 }
 
 /// Renders the files of jobs that have no line, and gives them theirs.
-fn render_left(
-    jobs: &[Job],
-    lines: &mut [Option<String>],
-    journal: Journal<'_>,
-) -> Result<Doubtful, Failure> {
+fn render_left(jobs: &[Job], lines: &mut [Option<String>], journal: Journal<'_>) -> Result<(), Failure> {
     let mut left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
     // Those of one bore one after another: only they play side by side.
     left.sort_by(|&one, &other| jobs[one].bore.cmp(&jobs[other].bore));
     let bar = bar(left.len(), "{bar:40} {pos} of {len}  {elapsed} (left: {eta})");
     let (journal, failed) = (Mutex::new(journal), Mutex::new(None));
-    let doubtful = Mutex::new(Doubtful::default());
     let made = side_by_side::each(
         left.len(),
         async |stand, at| {
@@ -313,9 +319,6 @@ fn render_left(
             let made = job.render.render_beside(stand, |_| ProgressBar::hidden()).await;
             let line = made.and_then(|made| {
                 let line = finished(&job.line, &made);
-                if let Ok(mut doubtful) = doubtful.lock() {
-                    doubtful.look(&job.file, &made);
-                }
                 if let Ok(mut journal) = journal.lock() {
                     journal.made(job, &line)?;
                 }
@@ -341,7 +344,7 @@ fn render_left(
     for (at, line) in left.into_iter().zip(made.unwrap_or_default()) {
         lines[at] = line;
     }
-    Ok(doubtful.into_inner().unwrap_or_default())
+    Ok(())
 }
 
 /// An empty table in place of an earlier one. What an earlier one links to is not touched.
@@ -363,7 +366,9 @@ fn in_one_line(error: &clap::Error) -> String {
 /// The whole line of a file.
 fn finished(begin: &str, made: &Rendered) -> String {
     let db = |x: f32| if x > 0.0 { format!("{:.2}", 20.0 * x.log10()) } else { "-inf".to_owned() };
-    format!("{begin},{:.4},{},{},{}", made.seconds, made.rate, db(made.level.peak), db(made.level.rms))
+    let warnings: Vec<_> = made.doubts().map(Doubt::id).collect();
+    let (peak, rms) = (db(made.level.peak), db(made.level.rms));
+    format!("{begin},{:.4},{},{peak},{rms},{}", made.seconds, made.rate, warnings.join(BETWEEN_DOUBTS))
 }
 
 #[cfg(test)]

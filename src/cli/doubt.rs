@@ -42,6 +42,19 @@ impl Doubt {
         all.into_iter().filter_map(|(doubt, is_so)| is_so.then_some(doubt))
     }
 
+    /// Every one.
+    pub const EACH: [Self; 4] = [Self::Clipped, Self::Limited, Self::Reset, Self::NoTone];
+
+    /// In tables.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Clipped => "clipped",
+            Self::Limited => "limited",
+            Self::Reset => "reset",
+            Self::NoTone => "no_tone",
+        }
+    }
+
     /// For the user.
     pub fn text(self) -> &'static str {
         match self {

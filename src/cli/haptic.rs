@@ -42,10 +42,10 @@ Examples:
 /// extinction gamma_off above which the shut reed is silent. On the knob they lie at a_on_deg and a_off_deg; at
 /// a_close_deg a resting reed with a sharp facing would be shut. Contrast above 1 exaggerates how the torque differs between notes, Place above 1
 /// how their angles differ; the requirement itself does not change. At a_on_deg the knob blows with gamma_sounding, where the
-/// reed as it moves begins to sound. All pressures are those of the transfer-matrix model; `knob`, `report` and the plugin take those of
+/// reed as it moves begins to sound. No hand turns the knob beyond wall_deg: a note whose a_off_deg lies there does not fall silent. All pressures are those of the transfer-matrix model; `knob`, `report` and the plugin take those of
 /// the waveguide that is played, up to 2 % apart.
 ///
-/// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding; a note
+/// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg; a note
 /// for which the theory finds no pressures has nan for them. A note that does not speak in tune and stays silent, such as C#7, has numbers. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
 /// against the breath. --plot draws torque against angle: of the note that is asked for, or of the easiest, the lowest, the
 /// reference and the hardest.
@@ -159,7 +159,7 @@ impl HapticCommand {
         }
         let mut table = self.table.open_beside(
             &plot,
-            "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding",
+            "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg",
         )?;
         table.comment(format_args!(
             "{}; zeta {}, {} about {}",
@@ -176,7 +176,7 @@ impl HapticCommand {
                 (pressure(|asked| asked.p_req_pa), pressure(|asked| asked.gamma_sounding));
             let (a, feel) = (note.landmarks, note.feel);
             table.line(format_args!(
-                "{},{},{},{},{:.4},{:.4},{:.4},{:.4},{},{},{}",
+                "{},{},{},{},{:.4},{:.4},{:.4},{:.4},{},{},{},{:.2}",
                 note.written.0,
                 number(gamma_on, 6),
                 number(gamma_off, 4),
@@ -187,7 +187,8 @@ impl HapticCommand {
                 feel.scale_mnm,
                 feel.h,
                 feel.k,
-                number(sounding, 6)
+                number(sounding, 6),
+                feel.wall_deg
             ))?;
         }
         table.finish()?;

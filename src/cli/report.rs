@@ -108,6 +108,7 @@ impl ReportCommand {
         if let Some(wav) = wav {
             wav.keep()?;
         }
+        say!("{}: written; open it in a browser", self.out.display());
         Ok(())
     }
 
@@ -119,6 +120,7 @@ impl ReportCommand {
         let report = tour::page(&job, command(), progress)?;
         write(&report, &mut page).map_err(|source| Failure::Report { path: self.out.clone(), source })?;
         page.keep()?;
+        say!("{}: written; open it in a browser", self.out.display());
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 //! A name is a flag of the command without its dashes, or the id of a parameter. So a command line, a plan, a table and
 //! Python name the same things in the same way.
 
+use crate::cli::shared_args;
 use crate::parameters::{self, PARAMETERS, Parameter};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, ArgAction, Args, Command};
@@ -56,6 +57,13 @@ pub fn advised(mut error: clap::Error, command: &Command) -> clap::Error {
             let near = near.trim_start_matches('-');
             !near.starts_with(wanted) && !is_like(near, wanted)
         };
+        // A note without its flag.
+        if has("written") && shared_args::note(&flag).is_ok() {
+            let advice = format!("a note follows its flag: --written {flag}");
+            error.remove(ContextKind::SuggestedArg);
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
+            return error;
+        }
         match (meant, error.get(ContextKind::SuggestedArg)) {
             (Some((_, _, advice)), _) => {
                 error.remove(ContextKind::SuggestedArg);

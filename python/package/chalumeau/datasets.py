@@ -95,7 +95,7 @@ def dataset(
     or a manifest.csv that is of none, is refused.
 
     ``manifest.csv`` has the columns of ``chalumeau batch`` (``file``, the names of the plan, ``length_s``, ``rate_hz``,
-    ``peak_dbfs``, ``rms_dbfs``) and then those of `measure`. ``file`` is the Parquet file of the row. With ``sound`` the Parquet
+    ``peak_dbfs``, ``rms_dbfs``) without its ``warnings``, and then those of `measure`. ``file`` is the Parquet file of the row. With ``sound`` the Parquet
     files have a column ``samples``, lists of float32; of two channels left and right in turn.
 
     Raises `ValueError` for a wrong plan or row, `RuntimeError` if a row is missing or twice.

@@ -136,4 +136,4 @@ fn file_name(line: &str) -> &str {
 }
 
 /// Columns of a line that are known after the rendering.
-const MEASURED_COLUMNS: usize = 4;
+const MEASURED_COLUMNS: usize = 5;

@@ -5,7 +5,7 @@ use crate::wav::{Depth, WavFile};
 use std::path::Path;
 
 /// The last columns of a table.
-const REST: &str = "length_s,rate_hz,peak_dbfs,rms_dbfs";
+const REST: &str = "length_s,rate_hz,peak_dbfs,rms_dbfs,warnings";
 
 fn batch(directory: &Path, plan: &str, text: &str, force: bool) -> (BatchCommand, PathBuf) {
     let path = directory.join(plan);
@@ -22,7 +22,7 @@ fn a_plan_is_rendered_once_and_goes_on_where_it_was() {
     command.run().unwrap();
     let manifest = fs::read_to_string(into.join(MANIFEST)).unwrap();
     let lines: Vec<_> = manifest.lines().collect();
-    assert_eq!(lines[0], "file,no-noise,seconds,gamma,written,length_s,rate_hz,peak_dbfs,rms_dbfs");
+    assert_eq!(lines[0], "file,no-noise,seconds,gamma,written,length_s,rate_hz,peak_dbfs,rms_dbfs,warnings");
     assert_eq!(lines.len(), 5);
     assert!(lines[2].starts_with("0002.wav,true,0.05,0.4,C4,0.0500,48000,"), "{}", lines[2]);
     assert!(!into.join(GROWING).exists());
@@ -48,7 +48,7 @@ fn what_this_plan_has_not_made_is_kept_unless_forced() {
     let plan = "[same]\nseconds = 0.05\n[vary]\nwritten = [\"E3\", \"C4\", \"G4\"]\n";
     let (command, into) = batch(directory.path(), "plan.toml", plan, false);
     let file = |name: &str| into.join(name);
-    let first = "0001.wav,0.05,E3,0.0500,48000,-1.00,-2.00";
+    let first = "0001.wav,0.05,E3,0.0500,48000,-1.00,-2.00,";
     let with_header = |line: &str| format!("file,seconds,written,{REST}\n{line}\n");
     // A file without a table, one that a finished table does not list, one with other arguments, and other columns.
     for (manifest, growing, says) in [
@@ -103,12 +103,14 @@ fn a_plan_that_is_corrected_before_any_file_was_made_is_the_same_plan() {
     let plan = "[vary]\nwritten = [\"E3\"]\n[same]\nseconds = 0.02\n";
     let (command, into) = batch(directory.path(), "plan.toml", plan, false);
     fs::create_dir(&into).unwrap();
-    fs::write(into.join(GROWING), "file,written,growl,length_s,rate_hz,peak_dbfs,rms_dbfs\n").unwrap();
+    fs::write(into.join(GROWING), "file,written,growl,length_s,rate_hz,peak_dbfs,rms_dbfs,warnings\n")
+        .unwrap();
     command.run().unwrap();
     assert!(into.join("0001.wav").exists() && !into.join(GROWING).exists());
     // With a file that may be of that plan it is refused.
     fs::rename(into.join(MANIFEST), into.join(GROWING)).unwrap();
-    fs::write(into.join(GROWING), "file,written,growl,length_s,rate_hz,peak_dbfs,rms_dbfs\n").unwrap();
+    fs::write(into.join(GROWING), "file,written,growl,length_s,rate_hz,peak_dbfs,rms_dbfs,warnings\n")
+        .unwrap();
     let said = command.run().unwrap_err().to_string();
     assert!(said.contains("is of another plan"), "{said}");
 }
@@ -168,6 +170,24 @@ fn what_is_called_as_the_table_and_is_another_is_kept() {
         assert!(said.contains("not the table of a batch") || said.contains("not of a batch"), "{said}");
         assert_eq!(fs::read_to_string(into.join(name)).unwrap(), text);
         fs::remove_file(into.join(name)).unwrap();
+    }
+}
+
+/// A file without a tone is named in the table, and so by every run of the command.
+#[test]
+fn a_file_without_a_tone_is_marked() {
+    let directory = tempfile::tempdir().unwrap();
+    let plan = "[same]\nseconds = 1\nwritten = \"C4\"\n[vary]\ngamma = [0.2, 0.5]\n";
+    let (command, into) = batch(directory.path(), "plan.toml", plan, false);
+    for _ in 0..2 {
+        command.run().unwrap();
+        let manifest = fs::read_to_string(into.join(MANIFEST)).unwrap();
+        let lines: Vec<_> = manifest.lines().skip(1).collect();
+        assert!(lines[0].ends_with(",no_tone") && lines[1].ends_with(','), "{manifest}");
+        let jobs = command.jobs(&Plan::read(&command.plan).unwrap()).unwrap();
+        let told =
+            Doubtful::read(&jobs, &lines.iter().map(|line| Some((*line).to_owned())).collect::<Vec<_>>());
+        assert_eq!(told.0.into_iter().collect::<Vec<_>>(), [(Doubt::NoTone, vec!["0001.wav".to_owned()])]);
     }
 }
 
