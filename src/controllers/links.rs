@@ -114,6 +114,12 @@ impl ControllerLinks {
         self.changes.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// Takes links and device of a text back, as the user does.
+    pub fn restore(&self, text: &str) {
+        self.take_text(text);
+        self.changes.fetch_add(1, Ordering::Relaxed);
+    }
+
     fn remember(&self, map: &ControllerMap) {
         let place = factory::all().iter().position(|other| other.name == map.name);
         self.device.store(place.map_or(0, |place| 1 + place as u32), Ordering::Relaxed);

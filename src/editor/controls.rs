@@ -4,11 +4,11 @@
 //! normalised, 0..=1; text is the parameter's own both ways. Every widget goes through [`Hands`], which remembers what
 //! was done.
 
-use crate::controllers::ControllerLinks;
 use crate::controllers::source_curves::SourceCurves;
+use crate::controllers::{ControllerLinks, ControllerMap};
 use crate::editor::ab_comparison::Values;
 use crate::editor::terms;
-use crate::editor::undo::{Change, Step, UndoHistory};
+use crate::editor::undo::{Change, DeviceChoice, Step, UndoHistory};
 
 /// Two normalised values that are nearer than this are one: what a host's single precision loses.
 pub const SAME: f32 = 1e-6;
@@ -203,14 +203,31 @@ impl Hands<'_> {
     /// Several at once as one step, whatever undo carries otherwise: a preset brings its instrument.
     /// `preset`: its name, and that of the one before.
     pub fn put_step(&mut self, values: &[(&'static str, f32)], preset: [String; 2]) {
+        let changes = self.put_free(values);
+        self.history.record(Step { changes, preset: Some(preset), ..Step::default() });
+    }
+
+    /// Chooses a device, as one step: its links replace all links, and `values` are set.
+    pub fn put_device(&mut self, map: &ControllerMap, values: &[(&'static str, f32)]) {
+        let Some(links) = self.controls.links() else { return };
+        let before = links.to_text();
+        links.learn(None);
+        links.choose(map);
+        let device = DeviceChoice { name: map.name.clone(), before, after: links.to_text() };
+        let changes = self.put_free(values);
+        self.history.record(Step { changes, device: Some(device), ..Step::default() });
+    }
+
+    /// Sets values where no hand holds the parameter, and tells what changed.
+    fn put_free(&self, values: &[(&'static str, f32)]) -> Vec<Change> {
         let free = values.iter().filter(|(id, _)| !self.held.contains(id));
         let values: Vec<(&'static str, f32)> = free.copied().collect();
         let looks = values
             .iter()
             .map(|&(id, after)| self.controls.look(id).map(|look| Change { id, before: look.value, after }));
-        let changes: Vec<Change> = looks.flatten().collect();
+        let changes = looks.flatten().collect();
         self.restore(&values);
-        self.history.record(Step { changes, preset: Some(preset), ..Step::default() });
+        changes
     }
 
     /// Records as a step that one of `count` choices was made, which the window asks for elsewhere.
@@ -223,7 +240,7 @@ impl Hands<'_> {
     }
 
     /// Sets values that are no new step: undo, redo, A/B.
-    pub fn restore(&mut self, values: &[(&'static str, f32)]) {
+    pub fn restore(&self, values: &[(&'static str, f32)]) {
         for &(id, value) in values {
             self.controls.begin(id);
             self.controls.set(id, value);

@@ -17,7 +17,7 @@ use crate::editor::preset_browser::PresetBrowser;
 use crate::editor::snapshot::{Severity, Snapshot, Status};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
-use crate::editor::undo::{Restored, Step};
+use crate::editor::undo::{DeviceChoice, Restored, Step};
 use crate::editor::window_state::{ZOOMS, has_room};
 use crate::editor::{Action, Tab, WindowState};
 
@@ -225,6 +225,11 @@ fn restore(restored: Restored, hands: &mut Hands, actions: &mut Vec<Action>) {
     hands.restore(&restored.values);
     actions.extend(restored.preset.map(Action::ChosePreset));
     actions.extend(restored.alterations.map(Action::Alter));
+    if let (Some([left, wanted]), Some(links)) = (&restored.links, hands.controls.links())
+        && links.to_text() == *left
+    {
+        links.restore(wanted);
+    }
 }
 
 /// What a step did, for the tip of the arrows.
@@ -232,6 +237,7 @@ fn step_name(hands: &Hands, step: &Step) -> String {
     match step {
         Step { moved: Some(moved), .. } => format!("the alteration of {}", moved.titles().join(", ")),
         Step { copied_from: Some(side), .. } => format!("the copy of {}", side.name()),
+        Step { device: Some(DeviceChoice { name, .. }), .. } => format!("the choice of {name}"),
         Step { preset: Some([_, chosen]), .. } => format!("the choice of {chosen}"),
         Step { changes, .. } => {
             changes.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", ")

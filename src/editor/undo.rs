@@ -84,6 +84,17 @@ fn joint<'a>(of: &'a Alterations, part: &str) -> Option<&'a PulledJoint> {
     of.joints.iter().find(|joint| joint.part == part)
 }
 
+/// The device that a step chose, and the links of controllers before and after it, as their text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DeviceChoice {
+    /// Of the device.
+    pub name: String,
+    /// Before the step.
+    pub before: String,
+    /// After it.
+    pub after: String,
+}
+
 /// A step: what it changed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
@@ -95,6 +106,8 @@ pub struct Step {
     pub copied_from: Option<ComparisonSide>,
     /// Holes and joints that it moved, if it moved any.
     pub moved: Option<Move>,
+    /// The device that it chose, if it chose one.
+    pub device: Option<DeviceChoice>,
 }
 
 impl Step {
@@ -113,6 +126,9 @@ pub struct Restored {
     pub preset: Option<String>,
     /// All alterations of the instrument, if the step moved a hole or a joint.
     pub alterations: Option<Alterations>,
+    /// Links of controllers, if the step chose a device: those that the step left, and those to bring back in their place. Where others
+    /// are there, the user has changed them since.
+    pub links: Option<[String; 2]>,
 }
 
 /// The steps that can be undone, and those that can be redone.
@@ -153,7 +169,8 @@ impl UndoHistory {
     /// A whole step at once.
     pub fn record(&mut self, mut step: Step) {
         step.changes.retain(|change| change.before != change.after);
-        if step.changes.is_empty() {
+        let has_linked = step.device.as_ref().is_some_and(|device| device.before != device.after);
+        if step.changes.is_empty() && !has_linked {
             return;
         }
         self.undone.clear();
@@ -203,8 +220,9 @@ impl UndoHistory {
         let values = step.changes.iter().rev().map(|change| (change.id, change.before)).collect();
         let preset = step.preset.as_ref().map(|[before, _]| before.clone());
         let alterations = step.moved.as_ref().map(|moved| moved.brought(now, &moved.before));
+        let links = step.device.as_ref().map(|device| [device.after.clone(), device.before.clone()]);
         self.undone.push(step);
-        Restored { values, preset, alterations }
+        Restored { values, preset, alterations, links }
     }
 
     /// Does the last undone step again. `now`: see [`undo`](Self::undo).
@@ -216,8 +234,9 @@ impl UndoHistory {
         let values = step.changes.iter().map(|change| (change.id, change.after)).collect();
         let preset = step.preset.as_ref().map(|[_, after]| after.clone());
         let alterations = step.moved.as_ref().map(|moved| moved.brought(now, &moved.after));
+        let links = step.device.as_ref().map(|device| [device.before.clone(), device.after.clone()]);
         self.done.push(step);
-        Restored { values, preset, alterations }
+        Restored { values, preset, alterations, links }
     }
 }
 

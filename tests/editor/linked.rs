@@ -109,6 +109,46 @@ fn a_device_brings_its_links_and_values_and_the_next_takes_them_back() {
 }
 
 #[test]
+fn undo_takes_a_device_back_with_its_links_and_leaves_what_came_after() {
+    let mut window = linking(Tab::Breath);
+    let choose = |window: &mut Window, device: &str| {
+        window.harness.get_by_role_and_label(Role::ComboBox, "Choose a device").click();
+        window.harness.run();
+        window.harness.get_by_label(device).click();
+        window.harness.run();
+    };
+    let press = |window: &mut Window, arrow: &str| {
+        window.harness.get_by_role_and_label(Role::Button, arrow).click();
+        window.harness.run();
+    };
+    let state = |window: &Window| {
+        let device = window.host.links.as_ref().unwrap().device().map(|map| map.name.as_str());
+        (device, links(window).len(), window.host.text("wheel", window.host.value("wheel")))
+    };
+    choose(&mut window, "WARBL");
+    choose(&mut window, "EWI");
+    let ewi = (Some("EWI"), 1, "Nothing".to_owned());
+    assert_eq!(state(&window), ewi);
+    press(&mut window, "Undo");
+    assert_eq!(state(&window), (Some("WARBL"), 0, "Vibrato".to_owned()));
+    press(&mut window, "Redo");
+    assert_eq!(state(&window), ewi);
+    // WARBL needs what a new instance has: only its links and its name change.
+    press(&mut window, "Undo");
+    press(&mut window, "Undo");
+    assert_eq!(state(&window), (None, 0, "Vibrato".to_owned()));
+    press(&mut window, "Redo");
+    press(&mut window, "Redo");
+    // A link that was learnt since is not lost.
+    let links_now = window.host.links.as_ref().unwrap();
+    let learnt = ParameterLink::whole(KNOB, chalumeau::parameters::find("growl").unwrap()).unwrap();
+    links_now.replace(&[learnt]);
+    press(&mut window, "Undo");
+    assert_eq!(links(&window), [learnt]);
+    assert_eq!(window.host.text("wheel", window.host.value("wheel")), "Vibrato");
+}
+
+#[test]
 fn a_row_of_the_table_forgets_its_own_link() {
     let mut window = linking(Tab::Breath);
     let of = |id: &str| ParameterLink::whole(KNOB, chalumeau::parameters::find(id).unwrap()).unwrap();

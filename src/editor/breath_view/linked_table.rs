@@ -67,12 +67,10 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
         ui.label(RichText::new(&map.shows).font(theme::small()).color(c.quiet));
     }
     let Some(map) = chosen else { return };
-    links.learn(None);
-    links.choose(map);
     let values = factory::values(map).into_iter().filter(|(parameter, _)| !is_players(hands, parameter));
     let values: Vec<_> =
         values.map(|(parameter, value)| (parameter.id, parameter.normalized(value))).collect();
-    hands.put_all(&values);
+    hands.put_device(map, &values);
 }
 
 /// All links, with their ranges and curves.
