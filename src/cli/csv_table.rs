@@ -29,7 +29,7 @@ const OTHERS: [(&str, &str); 11] = [
 /// Where a table goes.
 #[derive(Args)]
 pub struct TableArgs {
-    /// Where to write the table; - is standard output [default: -, but with --plot alone there is no table]
+    /// Where to write the table; - is standard output [default: -, unless a figure is drawn instead]
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Replace an existing file

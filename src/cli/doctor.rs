@@ -59,7 +59,14 @@ impl DoctorCommand {
             return Ok(self.ask_osc(&mut out, port)?);
         }
         if let Some(path) = &self.path {
-            self.ask(&mut out, KnobChoice::Path(path.clone()))?;
+            match self.ask(&mut out, KnobChoice::Path(path.clone()))? {
+                Answer::Live => {}
+                Answer::InUse => tell_who_has_it(&mut out)?,
+                Answer::None => {
+                    list_serial(&mut out, &RuntimeDir::default())?;
+                    tell_what_next(&mut out)?;
+                }
+            }
             return Ok(());
         }
         let places = RuntimeDir::default();

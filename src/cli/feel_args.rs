@@ -41,6 +41,9 @@ enum OrderArg {
     CoveredHolesReversed,
 }
 
+/// What stands in a take before the flags of the feel that was asked for.
+pub const ASKED_FOR: &str = ", asked for ";
+
 /// The parts of the feel that a user chooses.
 #[derive(Args)]
 #[command(next_help_heading = "Feel of the knob")]
@@ -132,8 +135,21 @@ impl FeelArgs {
         self.torque.is_none()
     }
 
+    /// Whether these flags, as [`in_flags`](Self::in_flags) writes them, turn angles into pressures as this feel does.
+    pub fn maps_like(&self, design: &FeelDesign, flags: &str) -> bool {
+        /// They change the torque alone.
+        const OF_THE_TORQUE: [&str; 3] = ["--contrast", "--torque", "--detent"];
+        let of_the_map = |flags: &str| {
+            let flags = flags.split(" --").map(|flag| flag.trim_start_matches("--").to_owned());
+            let is_of_torque = |flag: &String| {
+                OF_THE_TORQUE.iter().any(|name| flag.split(' ').next() == name.strip_prefix("--"))
+            };
+            flags.filter(|flag| !is_of_torque(flag)).collect::<Vec<_>>()
+        };
+        of_the_map(flags) == of_the_map(&self.in_flags(design))
+    }
+
     /// This feel as flags, for a file that is read later.
-    #[cfg(feature = "devices")]
     pub fn in_flags(&self, design: &FeelDesign) -> String {
         let value = |arg: Option<clap::builder::PossibleValue>| {
             arg.map_or_else(String::new, |arg| arg.get_name().to_owned())

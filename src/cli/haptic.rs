@@ -46,7 +46,7 @@ Examples:
 /// the waveguide that is played, up to 2 % apart.
 ///
 /// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg; a note
-/// for which the theory finds no pressures has nan for them. A note that does not speak in tune and stays silent, such as C#7, has numbers. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
+/// for which the theory finds no pressures has nan for them. A note that does not speak in tune and stays silent, such as C#7, has numbers. scale_mnm is the torque at the peak of the flow law with H = sqrt(27)/2, without the mark (--detent) that is added at the threshold; a refusal counts the mark and the friction, too. h and k are those of the law. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
 /// against the breath. --plot draws torque against angle: of the note that is asked for, or of the easiest, the lowest, the
 /// reference and the hardest.
 #[derive(Args)]
@@ -167,6 +167,12 @@ impl HapticCommand {
             self.felt.reed.zeta,
             self.felt.feel.exaggeration(),
             feel.reference().written
+        ))?;
+        let design = self.felt.feel.design(&file)?;
+        table.comment(format_args!(
+            "feel {}; ceiling {} mNm",
+            self.felt.feel.in_flags(&design),
+            self.felt.ceiling
         ))?;
         for note in feel.notes().iter().filter(wanted) {
             let asked = note.requirement;

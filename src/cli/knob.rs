@@ -1,6 +1,6 @@
 //! `chalumeau knob`: uses a knob without a DAW: watch it, feel a note on it, record a take.
 
-use crate::cli::feel_args::{FeelArgs, refused_in_flags};
+use crate::cli::feel_args::{ASKED_FOR, FeelArgs, refused_in_flags};
 use crate::cli::files;
 use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::cli::{Failure, INTERRUPTED};
@@ -144,7 +144,7 @@ impl KnobCommand {
         let take = match &self.record {
             Some(path) => {
                 let remarks = [format!(
-                    "{written} (written {}) of {}, asked for {}",
+                    "{written} (written {}) of {}{ASKED_FOR}{}",
                     written.0,
                     file.name,
                     self.feel.in_flags(&wanted.design)
@@ -250,6 +250,7 @@ impl KnobCommand {
         let mut said = String::new();
         // The latest of a connected knob, whether it is lost now, and when it was.
         let (mut stats, mut is_lost, mut lost_s) = (LinkStats::default(), false, 0.0);
+        let mut was_armed = false;
         // This thread obeys the user: what it prints is what the user sees. When it waits for its terminal, it beats no more.
         let heart = link.heartbeat("this program");
         let [stop, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
@@ -272,6 +273,7 @@ impl KnobCommand {
             }
             let status = link.status();
             let is_connected = matches!(status.phase, Phase::Live | Phase::ReadOnly);
+            was_armed |= status.armed;
             if is_connected {
                 (stats, is_lost) = (status.stats, false);
             } else if live_since.is_some() && !is_lost {
@@ -345,6 +347,9 @@ impl KnobCommand {
             1e-3 * f64::from(stats.jitter_p50_us),
             1e-3 * f64::from(stats.jitter_p99_us),
         );
+        if self.arm.is_some() && !was_armed {
+            say!("warning: the knob was never armed, so it made no torque");
+        }
         if let Some(take) = take {
             take.keep()?;
         }

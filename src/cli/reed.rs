@@ -131,7 +131,7 @@ pub struct ReedCommand {
 #[command(next_help_heading = "Figures")]
 struct Drawing {
     /// A new .png or .svg file (.json for its data, .gif for the sweep), or a directory; --figure all makes it if it does not exist
-    #[arg(long, alias = "plot", value_name = "PATH", requires = "figure", conflicts_with_all = ["table", "law", "physical"])]
+    #[arg(long, value_name = "PATH", requires = "figure", conflicts_with_all = ["table", "law", "physical"])]
     out: Option<PathBuf>,
     /// Kind of file made in a directory [default: png]
     #[arg(long, value_enum, value_name = "KIND", requires = "figure", conflicts_with_all = ["table", "law", "physical"])]

@@ -235,6 +235,13 @@ impl ScoreArgs {
                     take.seconds()
                 ));
             }
+            let design = self.feel.design(&model.file)?;
+            let recorded = self.breath.recorded_feel();
+            if let Some(flags) = recorded.filter(|flags| !self.feel.maps_like(&design, flags)) {
+                warnings.push(format!(
+                    "the take was recorded with {flags}; this feel turns its angles into other pressures, unless you give the same flags"
+                ));
+            }
             parts.events = self.replayed(take, &model, &settings, &parts)?;
         }
         // A single note lasts as long as was asked; a melody gets time to fade.

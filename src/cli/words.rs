@@ -84,9 +84,10 @@ fn is_like(known: &str, name: &str) -> bool {
 }
 
 /// Words that others use: for which flag, and what to say.
-const MEANT: [(&str, &str, &str); 3] = [
+const MEANT: [(&str, &str, &str); 4] = [
     ("note", "written", "'--written' takes a note as the player reads it, '--sounding' as it sounds"),
     ("velocity", "dynamic", "'--dynamic' sets how loud a note is"),
+    ("plot", "figure", "'--figure <FIGURE> --out <FILE>' draws"),
     ("reverb", "set", "'--set room=<VALUE>' sets Room"),
 ];
 

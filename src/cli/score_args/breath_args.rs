@@ -1,6 +1,7 @@
 //! Arguments for the breath that a score is blown with.
 
 use crate::cli::Failure;
+use crate::cli::feel_args::ASKED_FOR;
 use crate::cli::shared_args::{dynamics, within};
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_knob::touch::take::Take;
@@ -33,7 +34,8 @@ pub(super) struct BreathArgs {
     #[arg(long, value_name = "FROM:TO")]
     pub crescendo: Option<String>,
     /// Breath from a recorded take: a CSV file with t_us and angle_deg, from the plugin or `chalumeau knob`. Each note turns
-    /// the angle into its own pressure
+    /// the angle into its own pressure: repeat the flags of the feel with which it was recorded. The take's gamma is what the hand
+    /// felt; with --breath-response physical it blows
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
 }
@@ -103,6 +105,15 @@ impl BreathArgs {
     /// The recorded take whose angles blow.
     pub fn take(&self) -> Result<Option<Take>, Failure> {
         self.replay.as_deref().map(read_take).transpose()
+    }
+
+    /// The feel that the take of `chalumeau knob` was recorded with, as flags.
+    pub fn recorded_feel(&self) -> Option<String> {
+        let text = std::fs::read(self.replay.as_deref()?).ok()?;
+        let text = String::from_utf8_lossy(&text);
+        let remarks = text.lines().take_while(|line| line.starts_with('#'));
+        let mut feels = remarks.filter_map(|line| line.split_once(ASKED_FOR));
+        feels.next().map(|(_, flags)| flags.to_owned())
     }
 
     /// The files that are read. A number and a ramp are none.
