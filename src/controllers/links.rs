@@ -114,7 +114,7 @@ impl ControllerLinks {
         self.changes.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Takes links and device of a text back, as the user does.
+    /// Sets links and device as a text has them, as the user does.
     pub fn restore(&self, text: &str) {
         self.take_text(text);
         self.changes.fetch_add(1, Ordering::Relaxed);
