@@ -7,7 +7,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use std::collections::BTreeMap;
 use std::process::Command;
 
-const COLUMNS: [&str; 11] = [
+const COLUMNS: [&str; 12] = [
     "written_midi",
     "gamma_on",
     "gamma_off",
@@ -19,6 +19,7 @@ const COLUMNS: [&str; 11] = [
     "h",
     "k",
     "gamma_sounding",
+    "wall_deg",
 ];
 /// The reference note, which Contrast and Place do not change: C5.
 const REFERENCE_NOTE: u8 = 72;
