@@ -806,7 +806,7 @@ mod command {
         let all = rows("haptic --all --zeta 0.3 --contrast 1 --csv -", TABLE);
         assert_eq!((all.len(), all[0].len(), all[0][0]), (46, 12, 52.0));
         for row in &all {
-            // The wall of an angle map whose slopes are limited.
+            // The wall stands behind the closure.
             assert!(row[6] < row[11]);
             assert!((row[3] / (6_000.0 * row[1]) - 1.0).abs() < 1e-5);
             assert!(row[4] < row[6] && row[6] <= row[5] && (row[6] / row[4] - 3.0).abs() < 1e-3);

@@ -1,4 +1,4 @@
-//! Instruments from tables, made cylinders, and what the readers do with ten thousand broken files.
+//! Instruments from tables, made cylinders, and what the readers do with thousands of broken files.
 
 #[path = "../crates/core/tests/support/some.rs"]
 #[expect(dead_code, reason = "cases are counted here")]
@@ -614,7 +614,7 @@ fn with_modes(chart: &str) -> String {
     chart.lines().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Ten thousand broken files: every one is refused with a message or is an instrument.
+/// Thousands of broken files: every one is refused with a message or is an instrument.
 #[test]
 fn broken_files_are_refused_or_are_instruments() {
     let files = if some::all_cases() { 10_000 } else { 5_000 };

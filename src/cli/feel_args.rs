@@ -138,13 +138,11 @@ impl FeelArgs {
     /// Whether these flags, as [`in_flags`](Self::in_flags) writes them, turn angles into pressures as this feel does.
     pub fn maps_like(&self, design: &FeelDesign, flags: &str) -> bool {
         /// They change the torque alone.
-        const OF_THE_TORQUE: [&str; 3] = ["--contrast", "--torque", "--detent"];
+        const OF_THE_TORQUE: [&str; 3] = ["contrast ", "torque ", "detent "];
+        let is_of_torque = |flag: &str| OF_THE_TORQUE.iter().any(|name| flag.starts_with(name));
         let of_the_map = |flags: &str| {
-            let flags = flags.split(" --").map(|flag| flag.trim_start_matches("--").to_owned());
-            let is_of_torque = |flag: &String| {
-                OF_THE_TORQUE.iter().any(|name| flag.split(' ').next() == name.strip_prefix("--"))
-            };
-            flags.filter(|flag| !is_of_torque(flag)).collect::<Vec<_>>()
+            let flags = flags.split("--").map(str::trim).filter(|flag| !is_of_torque(flag));
+            flags.map(str::to_owned).collect::<Vec<_>>()
         };
         of_the_map(flags) == of_the_map(&self.in_flags(design))
     }

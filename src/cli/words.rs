@@ -52,22 +52,21 @@ pub fn advised(mut error: clap::Error, command: &Command) -> clap::Error {
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
     } else if let Some(flag) = unknown.filter(|_| error.kind() == ErrorKind::UnknownArgument) {
         let wanted = flag.trim_start_matches('-');
-        let meant = MEANT.iter().find(|(word, known, _)| *word == wanted && has(known));
+        let is_note = has("written") && shared_args::note(&flag).is_ok();
+        let meant = if is_note {
+            Some(format!("a note follows its flag: --written {flag}"))
+        } else {
+            let meant = MEANT.iter().find(|(word, known, _)| *word == wanted && has(known));
+            meant.map(|(_, _, advice)| (*advice).to_owned())
+        };
         let is_far = |near: &str| {
             let near = near.trim_start_matches('-');
             !near.starts_with(wanted) && !is_like(near, wanted)
         };
-        // A note without its flag.
-        if has("written") && shared_args::note(&flag).is_ok() {
-            let advice = format!("a note follows its flag: --written {flag}");
-            error.remove(ContextKind::SuggestedArg);
-            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
-            return error;
-        }
         match (meant, error.get(ContextKind::SuggestedArg)) {
-            (Some((_, _, advice)), _) => {
+            (Some(advice), _) => {
                 error.remove(ContextKind::SuggestedArg);
-                error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![(*advice).into()]));
+                error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
             }
             (None, Some(ContextValue::String(near))) if is_far(near) => {
                 error.remove(ContextKind::SuggestedArg);

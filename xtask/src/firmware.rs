@@ -56,7 +56,7 @@ fn everything(anarchy: u32) -> Result<()> {
         &sanitized,
         &[
             "-O1",
-            "-g1",
+            "-g",
             "-fsanitize=address,undefined",
             "-fno-sanitize-recover=all",
             "-fno-omit-frame-pointer",

@@ -6,6 +6,7 @@ use crate::cli::shared_args::{dynamics, within};
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -109,11 +110,10 @@ impl BreathArgs {
 
     /// The feel that the take of `chalumeau knob` was recorded with, as flags.
     pub fn recorded_feel(&self) -> Option<String> {
-        let text = std::fs::read(self.replay.as_deref()?).ok()?;
-        let text = String::from_utf8_lossy(&text);
-        let remarks = text.lines().take_while(|line| line.starts_with('#'));
-        let mut feels = remarks.filter_map(|line| line.split_once(ASKED_FOR));
-        feels.next().map(|(_, flags)| flags.to_owned())
+        let file = fs::File::open(self.replay.as_deref()?).ok()?;
+        let remarks =
+            io::BufReader::new(file).lines().map_while(Result::ok).take_while(|line| line.starts_with('#'));
+        remarks.filter_map(|line| line.split_once(ASKED_FOR).map(|(_, flags)| flags.to_owned())).next()
     }
 
     /// The files that are read. A number and a ramp are none.
