@@ -151,7 +151,7 @@ fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
         .flat_map(|condition| (0..conditions[condition].2.notes().len()).map(move |note| (condition, note)))
         .filter(|&(_, note)| MODEL.speaks(note))
         .collect();
-    let runs = some(runs, 6);
+    let runs = some(runs, 10);
     let passages = each(&runs, |&(condition, note)| {
         let table = &conditions[condition].2;
         passage(table, &table.notes()[note])

@@ -216,7 +216,7 @@ fn every_note_up_to_g_sharp_6_holds_its_register() {
         }
     }
     assert_eq!(runs.len(), 1_230);
-    let runs = some(runs, 2);
+    let runs = some(runs, 4);
     let right = each(&runs, in_register);
     let wrong: Vec<String> = runs
         .iter()
@@ -298,7 +298,7 @@ fn nothing_squeaks_under_a_proper_lip() {
             }
         }
     }
-    let runs = some(runs, 2);
+    let runs = some(runs, 4);
     let heard = each(&runs, squeaks);
     let squeaking: Vec<_> = runs
         .iter()

@@ -8,7 +8,7 @@ use egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 
 use crate::Window;
-use crate::support::Told;
+use crate::support::{Told, whole};
 
 /// What stands where.
 const SLIDERS: &[(Tab, &[&str])] = &[
@@ -531,7 +531,7 @@ fn a_right_click_asks_for_the_hosts_menu_and_moves_nothing() {
 #[test]
 fn what_a_host_has_tied_to_a_parameter_is_a_dot_of_its_colour() {
     let dots = |window: &mut Window| {
-        let picture = window.harness.render().unwrap();
+        let picture = whole(&window.harness);
         picture.pixels().filter(|pixel| pixel.0 == [255, 0, 254, 255]).count()
     };
     let mut window = Window::tall(Tab::Knob);

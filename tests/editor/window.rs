@@ -15,7 +15,7 @@ use egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 
 use crate::Window;
-use crate::support::Told;
+use crate::support::{Told, whole};
 
 fn click(window: &mut Window, label: &str) {
     window.harness.get_by_label(label).click();
@@ -246,7 +246,7 @@ fn pictures_of_pages() {
         folder.join(std::env::var("EDITOR_PICTURES").unwrap_or_else(|_| "target/editor-pages".into()));
     std::fs::create_dir_all(&folder).unwrap();
     let save = |window: &mut Window, name: &str| {
-        let picture = (0..6).find_map(|_| window.harness.render().ok()).unwrap();
+        let picture = whole(&window.harness);
         picture.save(folder.join(format!("{name}.png"))).unwrap();
     };
     let mut window = Window::new(Tab::Knob, (1100.0, 720.0));

@@ -511,11 +511,17 @@ pub fn window<'a>(
     harness
 }
 
+/// All of a window as a picture.
+pub fn whole(harness: &Harness<'_, EditorState>) -> image::RgbaImage {
+    let picture = chalumeau_raster::picture(&harness.ctx, harness.output());
+    let [width, height] = picture.size.map(|side| side as u32);
+    let bytes = picture.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
+    image::RgbaImage::from_raw(width, height, bytes).expect("four bytes for each pixel")
+}
+
 /// The window as a picture, without the frame.
-pub fn shot(harness: &mut Harness<'_, EditorState>, scale: f32) -> image::RgbaImage {
-    // A renderer in software may not be done in time on a busy machine.
-    let mut tries = (0..6).map(|_| harness.render());
-    let whole = tries.find_map(Result::ok).expect("six tries to draw a picture");
+pub fn shot(harness: &Harness<'_, EditorState>, scale: f32) -> image::RgbaImage {
+    let whole = whole(harness);
     let size = harness.state().kept.size;
     let px = |points: f32| (points * scale).round() as u32;
     image::imageops::crop_imm(&whole, px(FRAME), px(FRAME), px(size.0), px(size.1)).to_image()
@@ -545,7 +551,7 @@ pub fn picture(kept: &WindowState, controls: &Fake, snapshot: &Snapshot, scale: 
         let breath = breath_of_dynamic(MEZZO_FORTE, &snapshot.settings) as f32;
         snapshot.sources.iter_mut().filter(|source| source.is_live).for_each(|source| source.value = breath);
     }
-    shot(&mut window(kept, controls, &snapshot, scale), scale)
+    shot(&window(kept, controls, &snapshot, scale), scale)
 }
 
 /// Name and place in the picture of everything that can be moved, pressed or chosen.

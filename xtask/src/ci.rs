@@ -58,6 +58,9 @@ struct Step {
 #[derive(Clone, Copy, PartialEq)]
 enum Beside {
     Nothing,
+    /// Steps that build and fetch, as this one does: one more than there are cores, for now and then one of them waits, for a
+    /// server or for another's build. None of them follows a clock closely.
+    Building,
     /// Steps that keep a core busy, as this one does. None of them follows a clock.
     Busy,
     /// Steps that follow a clock and leave half a core idle, as this one does.
@@ -66,6 +69,10 @@ enum Beside {
 
 const fn alone(name: &'static str, run: fn() -> Result<()>) -> Step {
     Step { name, run, beside: Beside::Nothing }
+}
+
+const fn building(name: &'static str, run: fn() -> Result<()>) -> Step {
+    Step { name, run, beside: Beside::Building }
 }
 
 const fn beside(name: &'static str, run: fn() -> Result<()>) -> Step {
@@ -81,12 +88,14 @@ const fn waiting(name: &'static str, run: fn() -> Result<()>) -> Step {
 static STEPS: &[Step] = &[
     alone("system packages", packages),
     alone("format", || cargo("fmt --all --check")),
-    alone("clippy", || cargo("clippy --workspace --all-features --all-targets -- -D warnings")),
-    alone("clippy, core alone", || cargo("clippy -p chalumeau-core --all-targets -- -D warnings")),
-    alone("clippy, command line alone", || {
+    building("clippy", || cargo("clippy --workspace --all-features --all-targets -- -D warnings")),
+    building("Python environments", environments),
+    building("firmware, host and ARM", firmware::all),
+    building("clippy, core alone", || cargo("clippy -p chalumeau-core --all-targets -- -D warnings")),
+    building("clippy, command line alone", || {
         cargo("clippy -p chalumeau --no-default-features --features cli --all-targets -- -D warnings")
     }),
-    alone("clippy, plugin alone", || {
+    building("clippy, plugin alone", || {
         cargo("clippy -p chalumeau --no-default-features --features plugin -- -D warnings")
     }),
     // Before all that is linked to the library: the wheel builds it with fewer features into the same file, the plugin's, so that
@@ -95,15 +104,14 @@ static STEPS: &[Step] = &[
     alone("tests and programs build", || programs().map(drop)),
     alone("tests", tests::run),
     // The longest first.
-    beside("Python package", python_package),
-    beside("bundle", || bundle::run(&[])),
-    beside("web", web::test),
-    beside("Python examples", python_examples),
-    beside("firmware, host and ARM", firmware::all),
-    beside("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
-    beside("examples in documentation", || cargo("test --workspace --all-features --doc")),
-    beside("documentation", documentation),
-    beside("generated files", generated),
+    building("bundle", || bundle::run(&[])),
+    building("web", web::test),
+    building("Python examples", python_examples),
+    building("Python package", python_package),
+    building("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
+    building("documentation", documentation),
+    building("examples in documentation", || cargo("test --workspace --all-features --doc")),
+    building("generated files", generated),
     // The longest first.
     waiting("torque's ends in clack-host", torque_ends),
     waiting("knob's command", || tests::run_alone("knob_command")),
@@ -157,7 +165,10 @@ pub fn run(words: &[String]) -> Result<()> {
     for steps in chosen.chunk_by(|a, b| a.beside == b.beside && a.beside != Beside::Nothing) {
         match steps {
             [step] => report.push(done(step)),
-            _ => report.extend(at_once(steps, |step| beside::run(step))),
+            _ => {
+                let more = usize::from(steps[0].beside == Beside::Building);
+                report.extend(at_once(steps, cores() + more, |step| beside::run(step))?);
+            }
         }
     }
     println!();
@@ -182,12 +193,18 @@ fn done(step: &'static Step) -> Done {
     Done { step, passed: result.is_ok(), took }
 }
 
-/// What `work` says of each item, in their order: as many at once as there are cores, the first first.
-fn at_once<I: Sync, T: Send>(items: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// What `work` says of each item, in their order: `count` at once, the first first.
+fn at_once<I: Sync, T: Send>(items: &[I], count: usize, work: impl Fn(&I) -> T + Sync) -> Result<Vec<T>> {
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(count).build()?;
     // The bridge hands items out one by one; a slice would be parted in halves, which begin together.
-    let mut done: Vec<_> = items.iter().enumerate().par_bridge().map(|(at, item)| (at, work(item))).collect();
+    let all = || items.iter().enumerate().par_bridge().map(|(at, item)| (at, work(item))).collect();
+    let mut done: Vec<_> = threads.install(all);
     done.sort_by_key(|(at, _)| *at);
-    done.into_iter().map(|(_, done)| done).collect()
+    Ok(done.into_iter().map(|(_, done)| done).collect())
 }
 
 fn spoken(time: Duration) -> String {
@@ -291,22 +308,42 @@ fn standalone() -> Result<()> {
 const NO_DISPLAY: &str = ":9999";
 
 fn dawdreamer() -> Result<()> {
-    let python = python("venv", "dawdreamer, numpy", DAWDREAMER_PACKAGES)?;
+    let python = dawdreamer_python()?;
     let script = machine::root().join("crates/test-host/tests/vst3_in_dawdreamer.py");
     machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?).env("DISPLAY", NO_DISPLAY))
 }
 
 fn pedalboard() -> Result<()> {
-    let python = python("venv-pedalboard", "pedalboard, mido, numpy", PEDALBOARD_PACKAGES)?;
+    let python = pedalboard_python()?;
     let script = machine::root().join("crates/test-host/tests/vst3_in_pedalboard.py");
     machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?).env("DISPLAY", NO_DISPLAY))
 }
 
 fn python_examples() -> Result<()> {
-    let python = python("venv-examples", "numpy, matplotlib, libmapper, pythonosc", EXAMPLE_PACKAGES)?;
+    let python = examples_python()?;
     let tests = machine::root().join("examples/tests/python_examples.py");
     // The study kit draws what the command line measures.
     machine::run(Command::new(&python).arg(tests).env(artefacts::PROGRAM, &programs()?.program))
+}
+
+/// Fetches what all steps with Python need, while others build.
+fn environments() -> Result<()> {
+    for made in [package_python, examples_python, dawdreamer_python, pedalboard_python] {
+        made()?;
+    }
+    Ok(())
+}
+
+fn dawdreamer_python() -> Result<PathBuf> {
+    python("venv", "dawdreamer, numpy", DAWDREAMER_PACKAGES)
+}
+
+fn pedalboard_python() -> Result<PathBuf> {
+    python("venv-pedalboard", "pedalboard, mido, numpy", PEDALBOARD_PACKAGES)
+}
+
+fn examples_python() -> Result<PathBuf> {
+    python("venv-examples", "numpy, matplotlib, libmapper, pythonosc", EXAMPLE_PACKAGES)
 }
 
 /// The Python with which the wheel is built and tested.

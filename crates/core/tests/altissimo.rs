@@ -73,7 +73,7 @@ fn worst(instrument: Bundled) -> (f64, f64) {
         let model = prepared(instrument, rate_hz);
         let cases: Vec<(u8, f32)> =
             NOTES.into_iter().flat_map(|written| BREATHS.map(|breath| (written, breath))).collect();
-        let cases = some(cases, 2);
+        let cases = some(cases, 4);
         let play = |at: usize| heard(&model, rate_hz, cases[at].0, cases[at].1);
         let found = parallel::each(cases.len(), play, &mut |_| ControlFlow::Continue(())).unwrap();
         for (&(written, breath), heard) in cases.iter().zip(&found) {

@@ -401,7 +401,7 @@ fn slurs() -> Vec<Slurred> {
         }
     }
     assert_eq!(all.len(), 1_908);
-    let all = some(all, 2);
+    let all = some(all, 4);
     let slurs = each(all.len(), |n| slurred(all[n].0, all[n].1, all[n].2));
     let kinds: [Kind; 6] = [
         ("all", |_| true),

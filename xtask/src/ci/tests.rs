@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 
-use super::{at_once, spoken};
+use super::{at_once, cores, spoken};
 use crate::programs::{TestProgram, programs};
 
 /// Programs that follow a clock (ports, links, the simulated knob in real time) run while nothing else does.
@@ -36,7 +36,7 @@ pub fn run() -> Result<()> {
         all.into_iter().partition(|test| BY_THE_CLOCK.contains(&test.name.as_str()));
     others.sort_by_key(|test| LONG.iter().position(|name| *name == test.name).unwrap_or(LONG.len()));
     let mut results: Vec<_> = clock.into_iter().map(|test| played(test, &mut command(test))).collect();
-    results.extend(at_once(&others, |test| played(test, command(test).arg("--test-threads=1"))));
+    results.extend(at_once(&others, cores(), |test| played(test, command(test).arg("--test-threads=1")))?);
     let failed: Vec<_> = results.into_iter().filter_map(|result| Some(result.err()?.to_string())).collect();
     ensure!(failed.is_empty(), "{} failed: {}", failed.len(), failed.join(", "));
     Ok(())
