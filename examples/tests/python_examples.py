@@ -15,7 +15,9 @@ import python_study
 
 def help_tells_what_there_is():
     analyse, bridge = python_study.ANALYSE, python_bridge.BRIDGE
-    for program, words in ((analyse, ("--thresholds", "summary.csv")), (bridge, ("--interface", "NOT TRIED ON"))):
+    simulate = python_kit.EXAMPLES / "simulate_study.py"
+    told_by = ((analyse, ("--thresholds", "summary.csv")), (bridge, ("--interface", "NOT TRIED ON")), (simulate, ("--tremble",)))
+    for program, words in told_by:
         told = subprocess.run([sys.executable, program, "--help"], capture_output=True, text=True, check=False)
         assert told.returncode == 0 and all(word in told.stdout for word in words), told.stdout
 

@@ -4,16 +4,22 @@ All studies, or those whose name contains one of the words. python_examples.py r
 """
 
 import concurrent.futures
+import contextlib
 import functools
+import io
 import itertools
 import os
 import pathlib
+import subprocess
 import sys
+import tempfile
 
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-import simulated_study  # noqa: E402
+import python_kit  # noqa: E402
+import simulate_study  # noqa: E402
+import study_log  # noqa: E402
 import study_questions  # noqa: E402
 from study_measures import by_trial, summarise  # noqa: E402
 
@@ -27,14 +33,13 @@ FOUND_IN = EFFECT_IN if ALL else 14
 ALPHA = 0.05
 
 
-@functools.cache
 def reeds(equal_travel):
-    return simulated_study.reeds(equal_travel)
+    return simulate_study.reeds(python_kit.program(), equal_travel)
 
 
 def answers(reeds_, players, seed, trembles=None):
     """What a study says about the player, over participants: rows by opening and metric."""
-    trials = simulated_study.study(reeds_, seed, players, trembles)
+    trials = simulate_study.study(reeds_, seed, players, trembles)
     pieces = [piece for pieces in trials.values() for piece in pieces]
     pairs = study_questions.pairs_of(summarise(by_trial(pieces), 2.0))
     groups = {name: study_questions.compare_group("participants", pairs, name) for name in ("all", "below", "above")}
@@ -117,7 +122,54 @@ def a_planted_effect_of_one_standard_deviation_is_found():
     assert found >= FOUND_IN, found
 
 
+def logs_of_simulated_players_are_those_players():
+    """What simulate_study.py writes is read as what was simulated, in the order of the command line, and can be analysed."""
+    folder, players, seed = pathlib.Path(tempfile.mkdtemp()), 2, 7
+    logs, results = folder / "logs", folder / "results"
+
+    def simulate(*words):
+        """In this process, where the tables of feel are known: exit code, standard output and errors."""
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            try:
+                code = simulate_study.main([str(word) for word in words])
+            except SystemExit as stop:
+                code = stop.code
+        return code, out.getvalue(), err.getvalue()
+
+    os.environ[simulate_study.PROGRAM] = python_kit.program()
+    words = ("--out", logs, "--players", players, "--seed", seed, "--tremble", "1.5")
+    code, out, err = simulate(*words)
+    assert code == 0, err
+    files = sorted(logs.iterdir())
+    assert [str(path) for path in files] == out.split()
+    orders = [simulate_study.order(python_kit.program(), who, seed) for who in range(1, players + 1)]
+    simulated = simulate_study.study(reeds(True), seed, players, np.full(players, 1.5), orders)
+    for who, path in enumerate(files):
+        read = study_log.read_log(path, 0, study_log.Onset())
+        made = [piece for (of, _), own in simulated.items() if of == who for piece in own]
+        assert len(read) == len(made)
+        for was, now in zip(made, read):
+            assert (now.participant, now.trial, now.side, now.condition) == (who + 1, was.trial, was.side, was.condition)
+            assert abs(now.h - was.h) < 1e-9 and abs(now.k - was.k) < 1e-5 and now.has_threshold and now.is_visit
+            for name, near in (("angle_deg", 0.051), ("torque_mnm", 0.0051), ("gamma", 6e-6), ("gamma_on", 6e-6), ("written", 0)):
+                a, b = getattr(was, name), getattr(now, name)
+                assert np.allclose(a, b, rtol=0, atol=near, equal_nan=True), (path, name)
+        sides = [(piece.h, piece.condition) for piece in made if piece.side == "A"]
+        assert sorted(set(sides)) == sorted(set(orders[who])) and made[0].trial == 1
+    line = [sys.executable, python_kit.EXAMPLES / "analyse_study.py", *files, "--out", results, "--no-timelines"]
+    told = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert told.returncode == 0 and "WARNING" not in told.stdout, told.stdout + told.stderr
+    assert f"{players * simulate_study.TRIALS} trials of {players} participants" in told.stdout, told.stdout
+    # Nothing is replaced, and what cannot be is said.
+    code, _, err = simulate(*words)
+    assert code == 2 and "is there already" in err, err
+    code, _, err = simulate("--out", logs, "--players", 0)
+    assert code == 2 and "--players must be 1 to 100, got 0" in err, err
+
+
 TESTS = [
+    logs_of_simulated_players_are_those_players,
     equal_hands_find_nothing,
     enough_equal_hands_find_nothing_either,
     without_equal_travel_the_reed_is_measured,

@@ -1,21 +1,45 @@
-"""A study with simulated players, for python_null_study.py.
+#!/usr/bin/env python3
+"""Writes logs of a study with simulated players, to try the analysis before the first session.
+
+    python simulate_study.py --out logs
+    python analyse_study.py logs/*.csv --out results
+
+Nobody played these logs: a program moved simulated hands. Each player has a log of sixteen trials in the order that
+`chalumeau study` gives, with the columns of a take (docs/study.md). Nothing was heard, so level, pitch and onset are empty. Needs
+numpy, and `chalumeau` for the feel and the order.
 
 Both reeds of a trial get the same hand: movements in degrees, against the torque that the program says each reed has. The
 hand is a spring that the torque pushes back, it listens and corrects (as the program's own simulated hand,
 crates/knob/src/simulator/hand.rs), and it varies from note to note, trial to trial and person to person. How much it varies
 is judgement: reaction times and speeds of aimed movements vary by 15 to 20 %, physiological tremor is a few tenths of a
-degree. Time is in steps of 10 ms.
+degree. Time is in steps of 10 ms. The hands are the same on both reeds unless --tremble says otherwise.
+
+Exit code 0: done; 2: something cannot be used, and the message says why.
 """
 
+import argparse
 import csv
+import functools
 import io
 import math
+import os
+import pathlib
+import shutil
 import subprocess
+import sys
 
 import numpy as np
 import study_log
-from python_kit import program
-from study_log import Piece
+from study_log import BadInput, Piece
+
+# Names the command line, where it is not on the search path.
+PROGRAM = "CHALUMEAU_PROGRAM"
+TRIALS = 16
+# Columns of a log.
+COLUMNS = (
+    "t_us", "angle_deg", "velocity_deg_s", "torque_mnm", "written_midi", "gamma", "feel_id", "h", "k", "participant", "trial",
+    "side", "condition", "gamma_sounding", "level_db", "f0_hz", "heard_us",
+)
 
 STEP_S = 0.01
 OPENINGS = (2.0, 2.3, 2.9, 3.3)
@@ -35,16 +59,26 @@ def k_of(h, condition):
     return 27 / (4 * h**3) if condition == "coupled" else study_log.K_REFERENCE
 
 
-def reeds(equal_travel):
+def tell(program, words):
+    """The rows of a table that the command line prints. Raises BadInput."""
+    try:
+        told = subprocess.run([program, *words], capture_output=True, text=True, check=False)
+    except OSError as reason:
+        raise BadInput(f"{program}: cannot be started: {reason.strerror}; {PROGRAM} names the command line") from reason
+    if told.returncode != 0:
+        raise BadInput(f"`{program} {' '.join(words)}` failed: {told.stderr.strip()}")
+    return list(csv.DictReader(line for line in io.StringIO(told.stdout) if not line.startswith("#")))
+
+
+@functools.cache
+def reeds(program, equal_travel=True):
     """{(H, condition): landmarks of the notes}, from the program: thresholds, closures and torque in degrees and mNm."""
     found = {}
     for h in OPENINGS:
         for condition in study_log.CONDITIONS:
             line = f"haptic --all --torque {TORQUE_MNM:g} --ceiling 450 --H {h} --k {k_of(h, condition):.6f} --csv -"
             words = line.split() + (["--equal-travel"] if equal_travel else [])
-            told = subprocess.run([program(), *words], capture_output=True, text=True, check=False)
-            assert told.returncode == 0, told.stderr
-            rows = csv.DictReader(line for line in io.StringIO(told.stdout) if not line.startswith("#"))
+            rows = tell(program, words)
             by_note = {int(row["written_midi"]): {name: float(row[name]) for name in row} for row in rows}
             found[h, condition] = {
                 name: np.array([by_note[written][name] for written in WRITTEN])
@@ -78,16 +112,22 @@ class Players:
         self.overshoot_deg = np.clip(6 + 2 * random.standard_normal(count), 0, None)
 
 
-def study(reeds_, seed, count, trembles=None):
+def order(program, participant, seed):
+    """[(H, condition of side A)], from the program: the trials of a participant."""
+    rows = tell(program, f"study --participant {participant} --seed {seed} --csv -".split())
+    return [(float(row["h"]), row["a"]) for row in rows]
+
+
+def study(reeds_, seed, count, trembles=None, orders=None):
     """The trials of a study with `count` players, as `by_trial` gives them. `trembles` multiplies each player's tremor on the
-    free side."""
+    free side; `orders` has the trials of each player, otherwise they come in any order."""
     random = np.random.default_rng(seed)
     players = Players(random, count)
     stays = []
     for who in range(count):
-        order = random.permutation(16)
-        for trial, place in enumerate(order):
-            h, a = OPENINGS[place % 4], study_log.CONDITIONS[(place // 4) % 2]
+        places = random.permutation(TRIALS)
+        any_order = [(OPENINGS[place % 4], study_log.CONDITIONS[(place // 4) % 2]) for place in places]
+        for trial, (h, a) in enumerate(any_order if orders is None else orders[who]):
             b = study_log.CONDITIONS[a == "coupled"]
             # Half of the players go back to A in the end.
             for side, condition in [("A", a), ("B", b), ("A", a)][: 2 + int(random.integers(2))]:
@@ -182,3 +222,85 @@ def tremor(random, players, stays, who, steps, trembles):
         wobble += math.sqrt(2 / 6) * np.sin(2 * math.pi * hz * t + phase)
     hz, phase = random.uniform(0.3, 1.0, (count, 1)), random.uniform(0, 2 * math.pi, (count, 1))
     return size[:, None] * (wobble + np.sin(2 * math.pi * hz * t + phase))
+
+
+def write_log(path, remark, pieces):
+    """A log of one participant, as the plugin writes it. A stay begins half a second after the one before it."""
+
+    def cell(value, digits):
+        return "" if math.isnan(value) else f"{value:.{digits}f}"
+
+    with open(path, "x", encoding="utf-8", newline="") as file:
+        file.write(f"# {remark}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        begins_s = 0.0
+        for piece in pieces:
+            times_s = begins_s + piece.t_s - piece.t_s[0]
+            begins_s = times_s[-1] + 0.5
+            velocity = np.gradient(piece.angle_deg, STEP_S)
+            for row, t_s in enumerate(times_s):
+                note, sounding = piece.written[row], piece.gamma_on[row]
+                writer.writerow((
+                    round(1e6 * t_s), cell(piece.angle_deg[row], 1), cell(velocity[row], 1), cell(piece.torque_mnm[row], 2),
+                    cell(note, 0), cell(piece.gamma[row], 5), cell(piece.feel_id[row], 0), f"{piece.h:g}", f"{piece.k:.5f}",
+                    piece.participant, piece.trial, piece.side, piece.condition, cell(sounding, 5), "", "", "",
+                ))
+
+
+def write_study(program, folder, players, seed, tremble):
+    """The logs of a study, one for each player. Raises BadInput."""
+    people = range(1, players + 1)
+    orders = [order(program, participant, seed) for participant in people]
+    trials = study(reeds(program), seed, players, np.full(players, tremble), orders)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise BadInput(f"--out {folder}: cannot be made: {reason.strerror}") from reason
+    for who, participant in enumerate(people):
+        pieces = [piece for (of, _), own in trials.items() if of == who for piece in own]
+        for piece in pieces:
+            piece.participant = participant
+        path = folder / f"simulated-{participant:03}.csv"
+        words = f"simulated player {participant}, seed {seed}, tremor on the free side x {tremble:g}: nobody played this"
+        try:
+            write_log(path, words, pieces)
+        except FileExistsError:
+            raise BadInput(f"{path}: is there already; name another folder, or remove it") from None
+        except OSError as reason:
+            raise BadInput(f"{path}: cannot be written: {reason.strerror}") from reason
+        print(path)
+
+
+def main(argv=None):
+    words, _, rest = __doc__.partition("\n")
+    parser = argparse.ArgumentParser(
+        description=words, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the logs; created if missing")
+    parser.add_argument("--players", type=int, default=12, metavar="N", help="simulated players, 1 to 100 [default: 12]")
+    parser.add_argument("--seed", type=int, default=3, metavar="N", help="the study's seed, 1 to 9999 [default: 3]")
+    parser.add_argument(
+        "--tremble", type=float, default=1.0, metavar="FACTOR",
+        help="tremor on the free side over that on the coupled side, 0 to 10: 1 is a study in which there is nothing to find "
+        "[default: 1]",
+    )
+    args = parser.parse_args(argv)
+    for name, value, low, high in (
+        ("players", args.players, 1, 100), ("seed", args.seed, 1, 9999), ("tremble", args.tremble, 0, 10),
+    ):
+        if not low <= value <= high:
+            parser.error(f"--{name} must be {low} to {high}, got {value:g}")
+    program = os.environ.get(PROGRAM) or shutil.which("chalumeau")
+    if not program:
+        parser.error(f"`chalumeau` is not on the search path; {PROGRAM} may name it")
+    try:
+        write_study(program, pathlib.Path(args.out), args.players, args.seed, args.tremble)
+    except BadInput as reason:
+        print(f"simulate_study: {reason}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
