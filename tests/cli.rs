@@ -337,6 +337,7 @@ fn numbers_out_of_range_say_what_would_be_right() {
     refused(&d, "tune --written 40", &["written 40 (E2) has no fingering"]);
     refused(&d, "threshold --all --zeta 2", &["must lie in 0.05..0.9"]);
     refused(&d, "threshold C4", &["a note follows its flag: --written C4"]);
+    refused(&d, "fingerings C4", &["a note follows its flag: --note C4"]);
     refused(&d, "reed", &["--table"]);
     refused(&d, "reed --law --H 99", &["must lie in 0.5..10"]);
     refused(&d, "hum", &["unrecognized subcommand 'hum'"]);
@@ -565,6 +566,48 @@ fn a_limiter_that_worked_and_an_instrument_that_reaches_are_told() {
     let output = chalumeau(d.path(), ["render", KING, "--force", "--out", "x.wav"]);
     let low = String::from_utf8(output.stderr).unwrap();
     assert!(low.contains("notes have no fingering") && low.contains("; --instrument bass has them"), "{low}");
+}
+
+#[test]
+fn a_note_is_as_long_as_its_breath_and_breath_that_is_left_over_is_told() {
+    let d = tempfile::tempdir().unwrap();
+    let said = |line: &str| {
+        let output = chalumeau(d.path(), words(&format!("render {line} --rate 8000 --force --out x.wav")));
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{text}");
+        text
+    };
+    let seconds = || {
+        let reader = hound::WavReader::open(d.path().join("x.wav")).unwrap();
+        f64::from(reader.duration()) / f64::from(reader.spec().sample_rate)
+    };
+    for (line, expected_s) in [
+        ("--written C4 --breath ramp:0.4:0.6:2.5", 2.5),
+        ("--written C4 --breath ramp:0.4:0.6:0.5", 2.0),
+        ("--written C4 --breath ramp:0.4:0.6:2.5 --seconds 0.3", 0.3),
+    ] {
+        let text = said(line);
+        assert_eq!(seconds(), expected_s, "{line}");
+        assert!(!text.contains("the breath ends"), "{line}: {text}");
+    }
+    let text = said("--scale C4:D4 --seconds 0.2 --breath ramp:0.4:0.6:2.5");
+    let told = "the breath ends after 2.5 s, and the piece after 0.6 s: the rest of the breath is not played";
+    assert!(text.contains(told), "{text}");
+}
+
+#[test]
+fn a_table_of_pitches_names_its_tuning() {
+    let d = tempfile::tempdir().unwrap();
+    for (flags, tuning) in [
+        ("", "natural"),
+        ("--tempered", "tempered"),
+        ("--dynamic mf", "tempered"),
+        ("--tempered --untuned", "as built"),
+    ] {
+        let table = succeeds(d.path(), &format!("tune --written C4 {flags}"));
+        let remark = format!("# B flat clarinet, Boehm system, {tuning}; ");
+        assert!(table.lines().any(|line| line.starts_with(&remark)), "{flags}: {table}");
+    }
 }
 
 #[test]
@@ -1378,6 +1421,10 @@ fn help_names_what_the_command_has() {
         (
             "render --sounding 127 --out x.wav",
             "sounding 127 (G9) has no fingering; this instrument sounds 50 (D3) to 95 (B6)",
+        ),
+        (
+            "render --sounding C9 --out x.wav",
+            "sounding 120 (C9) has no fingering; this instrument sounds 50 (D3) to 95 (B6)",
         ),
         ("render --written C4 --breath ramp:0:1e300:1 --out x.wav", "gamma must lie in 0..3, got 1e300"),
         ("instrument new --notes A0 --out a0.toml", "A0 needs a bore 3015 mm long"),

@@ -926,6 +926,7 @@ fn doctor_tells_what_answers_and_what_to_do_when_nothing_does() {
         "firmware ",
         "jitter",
         "FEEL to its echo",
+        "link: ",
     ] {
         assert!(found.contains(say), "{say:?} in {found}");
     }

@@ -85,14 +85,16 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
     let at_48 = |file| Wanted::new(file, 48_000.0);
     let at_44 = |file| Wanted::new(file, 44_100.0);
     let chalumeau = || local("examples/instruments/alto-chalumeau.toml");
+    let cylinder = || local("examples/instruments/cylinder.toml");
     let mut cases = vec![
-        case("cylinder with two holes", at_48(local("examples/instruments/cylinder.toml"))),
+        case("cylinder with two holes", at_44(cylinder())),
         case("B flat x 0.8", at_48(resized(0.8))),
-        case("imported from CSV", at_44(chalumeau())),
+        case("imported from CSV", at_48(chalumeau())),
     ];
     if all_cases() {
         cases.extend([
-            case("imported from CSV", at_48(chalumeau())),
+            case("cylinder with two holes", at_48(cylinder())),
+            case("imported from CSV", at_44(chalumeau())),
             case("B flat x 1.5", at_48(resized(1.5))),
             case("A", at_48(Bundled::A.file())),
             // The largest; tests of bundled instruments play it as its data have it.
@@ -333,17 +335,20 @@ fn mouthpiece(model: &Model, note: &HeldNote) -> Vec<f64> {
 /// the instrument.
 #[test]
 fn tongued_notes_of_every_size_speak_at_once() {
-    let charted: Vec<_> = at_96_khz().filter(|case| case.model.file.fingerings.len() > 40).collect();
-    assert!(charted.len() >= 2, "the smallest and the largest size");
-    for case in charted {
-        let (model, rate_hz) = (&case.model, case.model.coeffs.rate_hz);
+    let bass = Preparation::new(&Wanted::new(Bundled::Bass.file(), 48_000.0), None).ready().unwrap().unwrap();
+    let bass = ("bass", Arc::new(bass));
+    let mut charted: Vec<_> = at_96_khz().map(|case| (case.name, case.model.clone())).collect();
+    charted.retain(|(name, model)| model.file.fingerings.len() > 40 && *name != bass.0);
+    assert!(!charted.is_empty(), "a small one");
+    for (name_of_case, model) in charted.iter().chain([&bass]) {
+        let rate_hz = model.coeffs.rate_hz;
         for (name, note, limit_ms) in [("C4", 60, 45.0), ("E3", 52, 60.0)] {
             let held = HeldNote::new(model, fingering(model, note), 0.5);
             let pressure = mouthpiece(model, &HeldNote { start: Start::Tongued(2.0), ..held });
             let t90_ms = 1e3 * onset::t90_s(&pressure, rate_hz, TONGUE_HOLD_S).unwrap();
             let limit_ms = limit_ms * size(model);
-            println!("{}, {name}: t90 {t90_ms:.1} ms from the tongue, at most {limit_ms:.1}", case.name);
-            assert!(t90_ms <= limit_ms, "{}, {name}: {t90_ms}", case.name);
+            println!("{name_of_case}, {name}: t90 {t90_ms:.1} ms from the tongue, at most {limit_ms:.1}");
+            assert!(t90_ms <= limit_ms, "{name_of_case}, {name}: {t90_ms}");
         }
     }
 }

@@ -1,10 +1,12 @@
 //! `chalumeau doctor`: lists knobs, says why one does not answer, and measures the connection.
 
 use crate::cli::Failure;
-use crate::cli::shared_args::within;
+use crate::cli::shared_args::{counted, within};
 use crate::identity::VERSION;
 use chalumeau_knob::device::discover::{PortKind, candidates, chip, ports};
-use chalumeau_knob::device::{Hooks, KnobChoice, KnobLink, LinkStatus, Phase, RuntimeDir, serial_text};
+use chalumeau_knob::device::{
+    Hooks, KnobChoice, KnobLink, LinkStats, LinkStatus, Phase, RuntimeDir, serial_text,
+};
 use chalumeau_knob::device::{midi, osc};
 use chalumeau_knob::wire::plain_text::plain;
 use chalumeau_knob::wire::{Capabilities, Feel, Info, MAJOR, MINOR};
@@ -309,6 +311,36 @@ fn tell_info(out: &mut impl Write, info: &Info) -> io::Result<()> {
     }
 }
 
+/// Most lateness of a position, 99th percentile, and longest way of a feel there and back that a lab should accept, us: between
+/// what an idle machine and a simulated knob have (docs/touch.md) and what a hand may feel or a log may show.
+const MOST_JITTER_US: u32 = 3_000;
+const MOST_FEEL_US: u32 = 10_000;
+
+/// Whether the link is as good as measurements need, and if not, what is wrong and what may help.
+fn judged(stats: &LinkStats) -> String {
+    let wire = &stats.wire;
+    let bad = wire.lost + wire.crc_errors + wire.length_errors + wire.range_errors;
+    let wrong: Vec<_> = [
+        (stats.jitter_p99_us > MOST_JITTER_US).then(|| "jitter above 3 ms at p99".to_owned()),
+        (bad > 0).then(|| format!("{} lost or damaged", counted(bad as usize, "frame"))),
+        stats
+            .feel_round_trip_us
+            .filter(|us| *us > MOST_FEEL_US)
+            .map(|_| "a feel takes more than 10 ms".to_owned()),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    if wrong.is_empty() {
+        "good".to_owned()
+    } else {
+        format!(
+            "{}; try another cable, a port without a hub, a machine that does nothing else",
+            wrong.join(", ")
+        )
+    }
+}
+
 fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
     let stats = &status.stats;
     let ms = |us: u32| f64::from(us) * 1e-3;
@@ -334,6 +366,28 @@ fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
     let (hello, feel) = (trip(stats.hello_round_trip_us), trip(stats.feel_round_trip_us));
     writeln!(out, "  round trip: HELLO to INFO {hello}, FEEL to its echo {feel}")?;
     writeln!(out, "  clocks differ by {:.0} ppm", stats.skew_ppm)?;
+    writeln!(out, "  link: {}", judged(stats))?;
     let words = [&status.alarm, &status.restriction, &status.last_refusal, &status.notice];
     words.into_iter().flatten().try_for_each(|text| writeln!(out, "  {text}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_is_good_until_something_is_wrong() {
+        let good = LinkStats {
+            jitter_p99_us: MOST_JITTER_US,
+            feel_round_trip_us: Some(MOST_FEEL_US),
+            ..LinkStats::default()
+        };
+        assert_eq!(judged(&good), "good");
+        let late = LinkStats { jitter_p99_us: MOST_JITTER_US + 1, ..good };
+        assert!(judged(&late).starts_with("jitter above 3 ms at p99; try"), "{}", judged(&late));
+        let mut lossy = LinkStats { feel_round_trip_us: Some(MOST_FEEL_US + 1), ..good };
+        (lossy.wire.lost, lossy.wire.crc_errors) = (1, 2);
+        let said = "3 frames lost or damaged, a feel takes more than 10 ms; try";
+        assert!(judged(&lossy).starts_with(said), "{}", judged(&lossy));
+    }
 }

@@ -46,6 +46,8 @@ pub use given::{Given, TimedNote};
 
 /// Least and greatest length of a note, s.
 const NOTE_S: (f64, f64) = (0.01, 3600.0);
+/// Length of a note where nothing says another, s.
+const USUAL_NOTE_S: f64 = 2.0;
 /// The waveguide that is played may begin so much below the threshold of the transfer-matrix model.
 const MODELS_APART: f64 = 0.98;
 /// Gamma at which every note of a clarinet has begun, also under a firm lip (`chalumeau threshold --zeta 0.15`: 0.54 at most, less a fifth).
@@ -53,6 +55,8 @@ const ALL_BEGIN: f64 = 0.5;
 
 /// By so much a take may be shorter than the piece without a word, s: the last note fades.
 const SHORT_TAKE_S: f64 = 1.0;
+/// By so much a breath may be longer than the piece without a word, s.
+const LEFT_OVER_S: f64 = 0.1;
 
 /// What to play, on what, and how.
 #[derive(Args)]
@@ -86,7 +90,8 @@ pub struct ScoreArgs {
     /// Slur the scale instead of tonguing each note
     #[arg(long, requires = "scale", conflicts_with_all = ["midi", "written", "sounding"])]
     slurred: bool,
-    /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, with --replay the take's; scale 0.5]
+    /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, with --replay the take's, with a longer --breath the
+    /// breath's; scale 0.5]
     #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, NOTE_S.0, NOTE_S.1))]
     seconds: Option<f64>,
     /// Time to fade after the last event, s, 0..60 [default: 1, one note 0; more with a fall or a breath in]
@@ -198,8 +203,10 @@ impl ScoreArgs {
         let trims = self.trims(&file)?;
         let keys = self.scl.as_ref().map(|scl| scale_file::read(scl, self.kbm.as_deref())).transpose()?;
         let take = self.breath.take()?;
-        let take_s = take.as_ref().map(Take::seconds);
-        let (mut parts, unplayed) = self.score(&file, &map, keys.as_ref(), &mut settings, take_s)?;
+        let breath_s = curve.as_ref().and_then(BreathCurve::ends_s).unwrap_or(0.0);
+        let note_s = take.as_ref().map_or(breath_s.max(USUAL_NOTE_S), Take::seconds);
+        let (mut parts, unplayed) = self.score(&file, &map, keys.as_ref(), &mut settings, note_s)?;
+        warnings.extend(self.breath_left_over(breath_s, &parts));
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);
         }
@@ -210,6 +217,15 @@ impl ScoreArgs {
             None => self.settings.idle(&settings, self.breath.source(), has_controllers)?,
         };
         Ok(Planned { file, settings, parts, unplayed, keys, trims, take, warnings, idle })
+    }
+
+    /// Says that breath remains at the end, unless the user chose that.
+    fn breath_left_over(&self, breath_s: f64, parts: &Score<PartEvent>) -> Option<String> {
+        let piece_s = parts.samples as f64 / f64::from(self.rate);
+        let is_chosen = self.seconds.is_some() && self.scale.is_none();
+        (breath_s > piece_s + LEFT_OVER_S && !is_chosen).then(|| {
+            format!("the breath ends after {breath_s:.1} s, and the piece after {piece_s:.1} s: the rest of the breath is not played")
+        })
     }
 
     /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
@@ -395,7 +411,7 @@ impl ScoreArgs {
         map: &ControllerMap,
         keys: Option<&KeyPitches>,
         settings: &mut Settings,
-        take_s: Option<f64>,
+        note_s: f64,
     ) -> Result<(Score<PartEvent>, Unplayed), Failure> {
         let links = as_links(&map.links, settings);
         let transposition = file.transposition;
@@ -463,7 +479,7 @@ impl ScoreArgs {
             let scale = Score::one_after_another(&notes, transposition, seconds, self.slurred, self.rate)?;
             return Ok(((&scale).into(), [0; 128]));
         }
-        let seconds = self.seconds.or(take_s.map(|take_s| take_s.clamp(NOTE_S.0, NOTE_S.1))).unwrap_or(2.0);
+        let seconds = self.seconds.unwrap_or(note_s.clamp(NOTE_S.0, NOTE_S.1));
         let sounding = match (self.written.map(WrittenNote), self.sounding.map(SoundingNote)) {
             (Some(written), _) => {
                 check_fingering(file, written)?;
@@ -473,8 +489,7 @@ impl ScoreArgs {
         };
         let written = sounding.and_then(|note| note.written(transposition));
         match (sounding, written) {
-            (Some(sounding), Some(written)) => {
-                check_fingering(file, written)?;
+            (Some(sounding), Some(written)) if file.fingering(written).is_some() => {
                 Ok(((&Score::note(sounding, seconds, self.rate)).into(), [0; 128]))
             }
             _ => {

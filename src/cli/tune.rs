@@ -106,8 +106,9 @@ impl TuneCommand {
         let plot = self.plot.open(self.table.force())?;
         let mut table =
             self.table.open_beside(&plot, "written_midi,f_hz,cents,register_ok,as_built_cents")?;
+        let tuning = if self.instrument.is_as_built() { "as built" } else { name_of(settings.tuning) };
         table.comment(format_args!(
-            "{name}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
+            "{name}, {tuning}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
             settings.a4_hz
         ))?;
         let built = self.instrument.as_built(&file, rate)?;

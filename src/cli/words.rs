@@ -52,12 +52,13 @@ pub fn advised(mut error: clap::Error, command: &Command) -> clap::Error {
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
     } else if let Some(flag) = unknown.filter(|_| error.kind() == ErrorKind::UnknownArgument) {
         let wanted = flag.trim_start_matches('-');
-        let is_note = has("written") && shared_args::note(&flag).is_ok();
-        let meant = if is_note {
-            Some(format!("a note follows its flag: --written {flag}"))
-        } else {
-            let meant = MEANT.iter().find(|(word, known, _)| *word == wanted && has(known));
-            meant.map(|(_, _, advice)| (*advice).to_owned())
+        let of_note = ["written", "note"].into_iter().find(|name| has(name));
+        let meant = match of_note.filter(|_| shared_args::note(&flag).is_ok()) {
+            Some(name) => Some(format!("a note follows its flag: --{name} {flag}")),
+            None => {
+                let meant = MEANT.iter().find(|(word, known, _)| *word == wanted && has(known));
+                meant.map(|(_, _, advice)| (*advice).to_owned())
+            }
         };
         let is_far = |near: &str| {
             let near = near.trim_start_matches('-');

@@ -252,6 +252,21 @@ impl BreathCurve {
         if points.is_empty() { Err(BreathError::Empty) } else { Ok(Self { points, relative: false }) }
     }
 
+    /// When the curve has its last value, s; 0 for one that stays as it is, `None` for one over the whole score.
+    ///
+    /// ```
+    /// use chalumeau_core::score::breath::BreathCurve;
+    ///
+    /// assert_eq!(BreathCurve::parse_ramp("ramp:0:0.8:4")?.ends_s(), Some(4.0));
+    /// assert_eq!(BreathCurve::constant(0.5).ends_s(), Some(0.0));
+    /// assert_eq!(BreathCurve::parse_crescendo("0.4:0.8")?.ends_s(), None);
+    /// # Ok::<(), chalumeau_core::score::breath::BreathError>(())
+    /// ```
+    pub fn ends_s(&self) -> Option<f64> {
+        let (end, _) = self.points[self.points.len() - 1];
+        (!self.relative).then_some(if self.points.len() > 1 { end } else { 0.0 })
+    }
+
     /// The largest gamma of the curve.
     pub fn gamma_max(&self) -> f32 {
         self.points.iter().fold(0.0, |max, p| max.max(p.1))
