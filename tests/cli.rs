@@ -1,5 +1,6 @@
 //! The command line as a user and a script meet it: each kind of mistake, and the tables others read.
 
+use some::some;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
@@ -8,6 +9,8 @@ use tempfile::TempDir;
 
 #[path = "../examples/make_pieces/main.rs"]
 mod make_pieces;
+#[path = "../crates/core/tests/support/some.rs"]
+mod some;
 #[path = "cli/what_is_measured.rs"]
 mod what_is_measured;
 

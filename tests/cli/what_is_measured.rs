@@ -121,7 +121,7 @@ fn notes_that_chords_hide_are_told() {
 fn fingerings_count_resonances_as_instrument_files_do() {
     let d = tempfile::tempdir().unwrap();
     let shown = succeeds(d.path(), "instrument show");
-    for note in ["E3", "G4", "A#4", "B4", "C6", "C#6", "F6", "G6"] {
+    for note in some(["E3", "G4", "A#4", "B4", "C6", "C#6", "F6", "G6"].to_vec(), 2) {
         let peak = format!("note,{note},");
         let of_file = shown.lines().find(|line| line.replace('"', "").starts_with(&peak)).unwrap();
         let mode = of_file.split("peak ").nth(1).unwrap().split(':').next().unwrap();

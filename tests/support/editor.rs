@@ -515,8 +515,7 @@ pub fn window<'a>(
 pub fn whole(harness: &Harness<'_, EditorState>) -> image::RgbaImage {
     let picture = chalumeau_raster::picture(&harness.ctx, harness.output());
     let [width, height] = picture.size.map(|side| side as u32);
-    let bytes = picture.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
-    image::RgbaImage::from_raw(width, height, bytes).expect("four bytes for each pixel")
+    image::RgbaImage::from_raw(width, height, picture.as_raw().to_vec()).expect("four bytes for each pixel")
 }
 
 /// The window as a picture, without the frame.
