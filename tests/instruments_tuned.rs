@@ -336,11 +336,11 @@ fn mouthpiece(model: &Model, note: &HeldNote) -> Vec<f64> {
 #[test]
 fn tongued_notes_of_every_size_speak_at_once() {
     let bass = Preparation::new(&Wanted::new(Bundled::Bass.file(), 48_000.0), None).ready().unwrap().unwrap();
-    let bass = ("bass", Arc::new(bass));
     let mut charted: Vec<_> = at_96_khz().map(|case| (case.name, case.model.clone())).collect();
-    charted.retain(|(name, model)| model.file.fingerings.len() > 40 && *name != bass.0);
+    charted.retain(|(_, model)| model.file.fingerings.len() > 40);
     assert!(!charted.is_empty(), "a small one");
-    for (name_of_case, model) in charted.iter().chain([&bass]) {
+    charted.push(("bass", Arc::new(bass)));
+    for (name_of_case, model) in &charted {
         let rate_hz = model.coeffs.rate_hz;
         for (name, note, limit_ms) in [("C4", 60, 45.0), ("E3", 52, 60.0)] {
             let held = HeldNote::new(model, fingering(model, note), 0.5);

@@ -311,15 +311,19 @@ fn tell_info(out: &mut impl Write, info: &Info) -> io::Result<()> {
     }
 }
 
-/// Most lateness of a position, 99th percentile, and longest way of a feel there and back that a lab should accept, us: between
-/// what an idle machine and a simulated knob have (docs/touch.md) and what a hand may feel or a log may show.
+/// Most lateness of a position that a lab should accept, 99th percentile, us: above what a simulated knob has on a busy machine
+/// (docs/touch.md). A judgement.
 const MOST_JITTER_US: u32 = 3_000;
+/// The same for a feel, there and back, us: its torque should be there soon after its note. A judgement.
 const MOST_FEEL_US: u32 = 10_000;
 
 /// Whether the link is as good as measurements need, and if not, what is wrong and what may help.
 fn judged(stats: &LinkStats) -> String {
     let wire = &stats.wire;
     let bad = wire.lost + wire.crc_errors + wire.length_errors + wire.range_errors;
+    if stats.rate_hz < 1.0 {
+        return "no positions arrive".to_owned();
+    }
     let wrong: Vec<_> = [
         (stats.jitter_p99_us > MOST_JITTER_US).then(|| "jitter above 3 ms at p99".to_owned()),
         (bad > 0).then(|| format!("{} lost or damaged", counted(bad as usize, "frame"))),
@@ -377,7 +381,9 @@ mod tests {
 
     #[test]
     fn a_link_is_good_until_something_is_wrong() {
+        assert_eq!(judged(&LinkStats::default()), "no positions arrive");
         let good = LinkStats {
+            rate_hz: 500.0,
             jitter_p99_us: MOST_JITTER_US,
             feel_round_trip_us: Some(MOST_FEEL_US),
             ..LinkStats::default()

@@ -1,5 +1,5 @@
-//! Draws what egui made on a processor: a picture for a test or for the guide needs no graphics card, and every machine draws
-//! the same pixels.
+//! Draws what egui made on a processor: a picture for a test or for the guide needs no graphics card, and the same triangles give the
+//! same pixels on every machine. Letters are drawn by egui, before they come here.
 //!
 //! Triangles cover pixels by the rules of graphics cards: corners lie on a grid of 1/256 of a pixel, a pixel belongs to the
 //! triangle that its centre is in, and on a shared edge to one of the two. Colours are mixed as egui asks: premultiplied, in
@@ -8,12 +8,10 @@
 use egui::epaint::{Mesh, Primitive, Vertex};
 use egui::{Color32, ColorImage, Pos2, Rect};
 
-/// Steps of a pixel that corners lie on.
-const STEPS: f32 = 256.0;
+/// Steps from a pixel to the next one; corners lie on steps.
+const STEPS: i64 = 256;
 /// From a pixel's corner to its centre, in steps.
-const CENTRE: i64 = 128;
-/// From a pixel to the next one, in steps.
-const NEXT: i64 = 256;
+const CENTRE: i64 = STEPS / 2;
 
 /// The last frame of `ctx`, on a transparent ground. Draws all meshes, with egui's own texture: that of letters.
 ///
@@ -46,13 +44,13 @@ pub fn picture(ctx: &egui::Context, output: &egui::FullOutput) -> ColorImage {
         assert_eq!(mesh.texture_id, egui::TextureId::default(), "only egui's own texture can be drawn here");
         let part = Part::of(primitive.clip_rect, scale, picture.size);
         for corners in mesh.indices.chunks_exact(3) {
-            part.triangle(&mut picture, &letters, scale, corner(mesh, corners));
+            part.triangle(&mut picture, &letters, scale, vertices(mesh, corners));
         }
     }
     picture
 }
 
-fn corner(mesh: &Mesh, indices: &[u32]) -> [Vertex; 3] {
+fn vertices(mesh: &Mesh, indices: &[u32]) -> [Vertex; 3] {
     [0, 1, 2].map(|at| mesh.vertices[indices[at] as usize])
 }
 
@@ -94,7 +92,7 @@ impl Part {
         let (low, high) = range(places.map(|(_, y)| y));
         let paint = Paint::of(&corners, twice_area, letters);
         for y in self.top.max(low)..self.bottom.min(high) {
-            let begin = (left * NEXT + CENTRE, y * NEXT + CENTRE);
+            let begin = (left * STEPS + CENTRE, y * STEPS + CENTRE);
             let weights = edges.each_ref().map(|edge| edge.at(begin));
             let (mut first, mut end) = (0, right - left);
             for (edge, weight) in edges.iter().zip(weights) {
@@ -110,13 +108,14 @@ impl Part {
 }
 
 fn on_grid(point: Pos2, scale: f32) -> (i64, i64) {
-    ((point.x * scale * STEPS).round() as i64, (point.y * scale * STEPS).round() as i64)
+    let steps = |points: f32| (points * scale * STEPS as f32).round() as i64;
+    (steps(point.x), steps(point.y))
 }
 
 /// Pixels whose centres may lie among `places`, from the first to one after the last.
 fn range(places: [i64; 3]) -> (i64, i64) {
     let [a, b, c] = places;
-    (a.min(b).min(c).div_euclid(NEXT), a.max(b).max(c).div_euclid(NEXT) + 1)
+    (a.min(b).min(c).div_euclid(STEPS), a.max(b).max(c).div_euclid(STEPS) + 1)
 }
 
 /// One edge of a triangle, which lies to its right (on a screen, whose y grows downwards).
@@ -138,7 +137,7 @@ impl Edge {
 
     /// What [`Self::at`] gains from one pixel to the next.
     fn along_x(&self) -> i64 {
-        -self.y * NEXT
+        -self.y * STEPS
     }
 
     /// Of the pixels `first..end` of a row whose first has `weight`, those on the triangle's side. A centre on the edge itself
