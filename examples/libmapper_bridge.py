@@ -19,10 +19,11 @@ NOT TRIED ON HARDWARE; all of this was read from public sources. For the moteus 
 firmware clips torque at 0.1 N m (20.8 counts). For the Mechaduino board 208 counts are 1.8 A; the torque is not
 documented. The firmware has no reed law: Scale and Stretch act on the curve of the current mode, and Offset only when a
 mode begins. In its mode Free, Scale is a constant torque that spins the knob: choose the mode before you start this
-program. That firmware has no watchdog and no torque limit. This program therefore sends nothing above --ceiling; raises
-Scale from 0 by at most 400 mNm a second once the map is made; and sets Scale and Damping to 0 when Chalumeau says so (it
-sends a feel only while Arm is on), when no feel has arrived for 3 seconds, and at the end of this program (Ctrl-C, a closed
-terminal, an error). If this program is killed, or its machine or the network fails, the knob keeps the last torque: keep its power switch
+program. That firmware has no watchdog and no torque limit. This program therefore sends no scale, friction or detent above
+--ceiling; raises Scale from 0 by at most 400 mNm a second once the map is made; and sets every field that makes torque to 0
+when Chalumeau says so (it sends a feel only while Arm is on), when no feel has arrived for 3 seconds, and at the end of this
+program (Ctrl-C, a closed terminal, an error). The wall and the slap region are stiffnesses: if you map them to a firmware of
+your own, that firmware must limit their torque. If this program is killed, or its machine or the network fails, the knob keeps the last torque: keep its power switch
 at hand. A knob that comes back is mapped again; one that vanished without logging off only after libmapper has dropped
 it, which takes half a minute.
 
@@ -70,7 +71,7 @@ FIELDS = {
     "detent": ("mNm", 0, 100),
 }
 # Fields that make torque by themselves; they go to 0 when no feel arrives.
-TORQUE = ("scale", "damping")
+TORQUE = ("scale", "wall_mnm_per_deg", "slap_mnm_per_deg", "damping", "friction", "detent")
 # TorqueTuner's signals: name, field, factor, and range.
 RPM_PER_RAD_S = 60 / (2 * math.pi)
 COUNTS_PER_NM = 208.0
@@ -162,8 +163,10 @@ def limits_for(ceiling_mnm, targets):
         if low / factor > least or high / factor < most:
             why = f" ({signal_name} takes {low:g}..{high:g})"
             limits[field] = (max(least, low / factor), min(most, high / factor), why)
-    if ceiling_mnm < limits["scale"][1]:
-        limits["scale"] = (0, ceiling_mnm, " (--ceiling)")
+    for name in ("scale", "friction", "detent"):
+        low, most, _ = limits[name]
+        if ceiling_mnm < most:
+            limits[name] = (low, ceiling_mnm, " (--ceiling)")
     return limits
 
 
@@ -350,7 +353,7 @@ def arguments():
     default, most = CEILING_MNM
     parser.add_argument(
         "--ceiling", type=within(0, most), default=default, metavar="MNM",
-        help=f"largest scale that is passed on, mNm, 0..{most:g} [default: {default:g}]",
+        help=f"largest scale, friction and detent that are passed on, mNm, 0..{most:g} [default: {default:g}]",
     )
     parser.add_argument(
         "--counts-per-nm", type=within(1, 10_000), default=COUNTS_PER_NM, metavar="N",

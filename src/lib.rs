@@ -8,7 +8,7 @@
 //! - `plugin` uses the editor, and puts it into the host's window.
 //! - `standalone` uses the plugin, and runs it without a host. The plugin does not use the standalone.
 //! - `tour` is what the listening pages of the command line and of the browser play.
-//! - `cache`, `controllers`, `folder_listing`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
+//! - `cache`, `controllers`, `feel_flags`, `folder_listing`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
 //!   `identity` has the names that hosts know the plugin by. They use none of the four.
 
 pub mod cache;
@@ -18,6 +18,7 @@ pub mod controllers;
 pub mod data_folder;
 #[cfg(feature = "editor")]
 pub mod editor;
+pub mod feel_flags;
 pub mod folder_listing;
 pub mod identity;
 pub mod instrument_path;

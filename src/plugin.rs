@@ -219,7 +219,7 @@ impl Chalumeau {
         }
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
-            audio.prepare(&self.params, &self.shared_instrument);
+            audio.prepare(&self.params, &self.shared_instrument, config.max_buffer_size as usize);
         }
         self.microphone.prepare(f64::from(config.sample_rate), config.max_buffer_size);
         self.settings = self.params.settings();

@@ -14,12 +14,12 @@ pub struct TakeFile {
 }
 
 impl TakeFile {
-    /// Begins a file with remarks, one per line, and the names of the columns. `force` replaces an existing file.
-    pub fn create(path: &Path, force: bool, remarks: &[String]) -> Result<Self, OutputError> {
-        let file = NewFile::create(path, force)?;
+    /// Begins `file` with remarks, one per line, and the names of the columns.
+    pub fn begin(file: NewFile, remarks: &[String]) -> Result<Self, OutputError> {
+        let path = file.path().to_owned();
         match TakeWriter::new(file, remarks) {
             Ok(writer) => Ok(Self { writer }),
-            Err(source) => Err(OutputError::Write { path: path.to_owned(), source }),
+            Err(source) => Err(OutputError::Write { path, source }),
         }
     }
 
@@ -47,12 +47,12 @@ mod tests {
     fn a_take_appears_whole() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("take.csv");
-        let mut take = TakeFile::create(&path, false, &["participant 7".to_owned()]).unwrap();
+        let file = NewFile::create(&path, false).unwrap();
+        let mut take = TakeFile::begin(file, &["participant 7".to_owned()]).unwrap();
         assert_eq!(take.path().file_name(), path.file_name());
         take.write(&TakeRow::default(), &TakeMarks::default()).unwrap();
         assert!(!path.exists(), "no half-written file");
         take.keep().unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 3);
-        assert!(matches!(TakeFile::create(&path, false, &[]), Err(OutputError::Exists(_))));
     }
 }

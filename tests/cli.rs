@@ -813,18 +813,27 @@ fn a_take_blows_and_a_damaged_one_is_refused_by_line() {
     // A take says which feel it was recorded with.
     let flags = "--law pressure --contrast 3 --place 1 --order physical --torque 40 --travel 360 --detent 6";
     let take =
-        format!("# C4 (written 60) of B flat clarinet, asked for {flags}\nt_us,angle_deg\n0,0\n900000,180\n");
+        format!("# C4 (written 60) of B flat clarinet\n# feel {flags}\nt_us,angle_deg\n0,0\n900000,180\n");
+    fs::write(d.path().join("rows.csv"), "t_us,angle_deg\n0,0\n900000,180\n").unwrap();
+    succeeds(d.path(), &format!("{render} --replay rows.csv --law pressure --out v.wav"));
     fs::write(d.path().join("spring.csv"), take).unwrap();
-    for (feel, warns) in [("", true), ("--law pressure --contrast 5 --torque 20", false), ("--place 2", true)]
-    {
+    for (feel, is_same) in [
+        ("", true),
+        ("--law pressure --contrast 5 --torque 20", true),
+        ("--law flow", false),
+        ("--place 2", false),
+    ] {
         let line = format!("{render} --replay spring.csv {feel} --force --out w.wav");
         let output = chalumeau(d.path(), words(&line));
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(
-            output.status.success() && said.contains("was recorded with --law pressure") == warns,
+            output.status.success() && said.contains("was recorded with --law pressure") != is_same,
             "{said}"
         );
+        assert_eq!(sound("w.wav") == sound("v.wav"), is_same, "{feel}");
     }
+    fs::write(d.path().join("odd.csv"), "# feel --loudness 3\nt_us,angle_deg\n0,0\n").unwrap();
+    refused(&d, &format!("{render} --replay odd.csv --out x.wav"), &["# feel", "--loudness", "remove it"]);
     fs::write(d.path().join("bad.csv"), "t_us,angle_deg\n0,0\n5,far\n").unwrap();
     refused(&d, &format!("{render} --replay bad.csv --out x.wav"), &["bad.csv", "line 3", "`far`"]);
     refused(&d, &format!("{render} --replay none.csv --out x.wav"), &["none.csv"]);

@@ -238,7 +238,7 @@ def an_error_switches_torque_off():
         libmapper_bridge.Signals, libmapper_bridge.serve, sys.argv = kept
         for name, handler in handlers.items():
             signal.signal(getattr(signal, name), handler)
-    assert said == [{"scale": 0.0, "damping": 0.0}, "free"], said
+    assert said == [dict.fromkeys(libmapper_bridge.TORQUE, 0.0), "free"], said
 
 
 def what_chalumeau_says_at_the_end_is_passed_on_at_once():
@@ -248,6 +248,7 @@ def what_chalumeau_says_at_the_end_is_passed_on_at_once():
     bridge.take(bundle(**PLAYED), 0.0)
     bridge.due(0.01, 1.0)
     off = {"scale": 0.0, "wall_mnm_per_deg": 0.0, "slap_mnm_per_deg": 0.0, "damping": 0.0, "friction": 0.0, "detent": 0.0}
+    assert set(libmapper_bridge.TORQUE) == set(off)
     bridge.take(bundle(**PLAYED | off), 0.02)
     due = bridge.due(0.03, 0.01)
     assert bridge.refused == 0 and {name: due[name] for name in off} == off, due

@@ -324,25 +324,20 @@ fn judged(stats: &LinkStats) -> String {
     if stats.rate_hz < 1.0 {
         return "no positions arrive".to_owned();
     }
-    let wrong: Vec<_> = [
-        (stats.jitter_p99_us > MOST_JITTER_US).then(|| "jitter above 3 ms at p99".to_owned()),
-        (bad > 0).then(|| format!("{} lost or damaged", counted(bad as usize, "frame"))),
+    let late = "take a port without a hub, and close other programs";
+    let wrong = [
+        (stats.jitter_p99_us > MOST_JITTER_US).then(|| format!("jitter above 3 ms at p99: {late}")),
+        (bad > 0).then(|| {
+            let frames = counted(bad as usize, "frame");
+            format!("{frames} lost or damaged: try another cable, and a port without a hub")
+        }),
         stats
             .feel_round_trip_us
             .filter(|us| *us > MOST_FEEL_US)
-            .map(|_| "a feel takes more than 10 ms".to_owned()),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    if wrong.is_empty() {
-        "good".to_owned()
-    } else {
-        format!(
-            "{}; try another cable, a port without a hub, a machine that does nothing else",
-            wrong.join(", ")
-        )
-    }
+            .map(|_| format!("a feel takes more than 10 ms: {late}")),
+    ];
+    let wrong: Vec<_> = wrong.into_iter().flatten().collect();
+    if wrong.is_empty() { "good".to_owned() } else { wrong.join("\n  link: ") }
 }
 
 fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
@@ -390,10 +385,13 @@ mod tests {
         };
         assert_eq!(judged(&good), "good");
         let late = LinkStats { jitter_p99_us: MOST_JITTER_US + 1, ..good };
-        assert!(judged(&late).starts_with("jitter above 3 ms at p99; try"), "{}", judged(&late));
+        assert!(judged(&late).starts_with("jitter above 3 ms at p99: take"), "{}", judged(&late));
         let mut lossy = LinkStats { feel_round_trip_us: Some(MOST_FEEL_US + 1), ..good };
         (lossy.wire.lost, lossy.wire.crc_errors) = (1, 2);
-        let said = "3 frames lost or damaged, a feel takes more than 10 ms; try";
-        assert!(judged(&lossy).starts_with(said), "{}", judged(&lossy));
+        let said = judged(&lossy);
+        let lines: Vec<_> = said.split("\n  link: ").collect();
+        assert_eq!(lines.len(), 2, "{said}");
+        assert!(lines[0].starts_with("3 frames lost or damaged: try another cable"), "{said}");
+        assert!(lines[1].starts_with("a feel takes more than 10 ms: take"), "{said}");
     }
 }

@@ -6,7 +6,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, NoteOrder};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::wire::message::TorqueLaw;
-use clap::{Args, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
 
 fn inside(text: &str, (low, high): (f64, f64)) -> Result<f64, String> {
     within(text, low, high)
@@ -21,15 +21,6 @@ enum LawArg {
     Pressure,
 }
 
-/// A law as figures name it.
-pub fn law_name(law: TorqueLaw) -> &'static str {
-    match law {
-        TorqueLaw::Flow => "flow",
-        TorqueLaw::Pressure => "pressure",
-        TorqueLaw::Free => "free",
-    }
-}
-
 /// Orders by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum OrderArg {
@@ -40,9 +31,6 @@ enum OrderArg {
     /// The longer the closed tube, the easier
     CoveredHolesReversed,
 }
-
-/// What stands in a take before the flags of the feel that was asked for.
-pub const ASKED_FOR: &str = ", asked for ";
 
 /// The parts of the feel that a user chooses.
 #[derive(Args)]
@@ -77,7 +65,40 @@ pub struct FeelArgs {
     detent: Option<f64>,
 }
 
+/// The flags of the feel alone, as a take has them.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct RecordedFlags {
+    #[command(flatten)]
+    feel: FeelArgs,
+}
+
 impl FeelArgs {
+    /// Reads flags that a take has kept. The error says what is wrong with them.
+    pub fn recorded(flags: &str) -> Result<Self, String> {
+        let read = RecordedFlags::try_parse_from(flags.split_whitespace());
+        read.map(|read| read.feel).map_err(|error| {
+            let text = error.to_string();
+            let first = text.lines().next().unwrap_or_default();
+            first.trim_start_matches("error: ").to_owned()
+        })
+    }
+
+    /// These flags, and those of `recorded` where one is missing.
+    pub fn or(&self, recorded: Self) -> Self {
+        Self {
+            law: self.law.or(recorded.law),
+            contrast: self.contrast.or(recorded.contrast),
+            place: self.place.or(recorded.place),
+            equal_travel: self.equal_travel || recorded.equal_travel,
+            order: self.order.or(recorded.order),
+            reference: self.reference.or(recorded.reference),
+            torque: self.torque.or(recorded.torque),
+            travel: self.travel.or(recorded.travel),
+            detent: self.detent.or(recorded.detent),
+        }
+    }
+
     /// The feel these arguments describe, on this instrument.
     pub fn design(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
         if let Some(reference) = self.reference {
@@ -135,42 +156,6 @@ impl FeelArgs {
         self.torque.is_none()
     }
 
-    /// Whether these flags, as [`in_flags`](Self::in_flags) writes them, turn angles into pressures as this feel does.
-    pub fn maps_like(&self, design: &FeelDesign, flags: &str) -> bool {
-        /// They change the torque alone.
-        const OF_THE_TORQUE: [&str; 3] = ["contrast ", "torque ", "detent "];
-        let is_of_torque = |flag: &str| OF_THE_TORQUE.iter().any(|name| flag.starts_with(name));
-        let of_the_map = |flags: &str| {
-            let flags = flags.split("--").map(str::trim).filter(|flag| !is_of_torque(flag));
-            flags.map(str::to_owned).collect::<Vec<_>>()
-        };
-        of_the_map(flags) == of_the_map(&self.in_flags(design))
-    }
-
-    /// This feel as flags, for a file that is read later.
-    pub fn in_flags(&self, design: &FeelDesign) -> String {
-        let value = |arg: Option<clap::builder::PossibleValue>| {
-            arg.map_or_else(String::new, |arg| arg.get_name().to_owned())
-        };
-        let mut flags = format!(
-            "--law {} --contrast {} --place {} --order {} --torque {} --travel {} --detent {}",
-            value(self.law.unwrap_or(LawArg::Flow).to_possible_value()),
-            design.contrast,
-            design.place,
-            value(self.order.unwrap_or(OrderArg::Physical).to_possible_value()),
-            design.strength_mnm,
-            design.travel_deg,
-            design.mark_mnm(),
-        );
-        if let Some(reference) = design.reference {
-            flags += &format!(" --reference {reference}");
-        }
-        if design.equal_travel {
-            flags += " --equal-travel";
-        }
-        flags
-    }
-
     /// Contrast and Place in words.
     pub fn exaggeration(&self) -> String {
         format!("Contrast {}, Place {}", self.contrast(), self.place())
@@ -207,6 +192,31 @@ pub fn refused_in_flags(refused: FeelRefused, ceiling: &str, has_reed: bool) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::feel_flags::in_flags;
+
+    #[test]
+    fn a_feel_as_flags_is_that_feel() {
+        let file = InstrumentFile::built_in();
+        let usual = "--law flow --contrast 3 --place 1 --order physical --torque 55 --travel 360 --detent 9";
+        assert_eq!(in_flags(&FeelDesign::default()), usual);
+        for flags in [
+            usual,
+            "--law pressure --contrast 2.3 --place 5 --order covered-holes --torque 260 --travel 120 --detent 0 --reference Bb4",
+            "--law flow --contrast 1 --place 1 --order covered-holes-reversed --torque 0 --travel 360.5 --detent 9 --equal-travel",
+        ] {
+            let design = FeelArgs::recorded(flags).unwrap().design(&file).ok().unwrap();
+            assert_eq!(in_flags(&design), flags.replace("Bb4", "A#4"));
+        }
+        let given = FeelArgs::recorded("--place 2 --reference E3").unwrap();
+        let both = given.or(FeelArgs::recorded("--place 5 --law pressure").unwrap());
+        let design = both.design(&file).ok().unwrap();
+        assert_eq!((design.place, design.law), (2.0, TorqueLaw::Pressure));
+        assert_eq!(design.reference, Some(WrittenNote(52)));
+        for wrong in ["--loudness 3", "--place far", "out.wav"] {
+            let said = FeelArgs::recorded(wrong).err().unwrap();
+            assert!(said.contains(wrong.rsplit(' ').next_back().unwrap()), "{said}");
+        }
+    }
 
     #[test]
     fn the_help_says_the_ranges() {

@@ -2,9 +2,10 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, number};
-use crate::cli::feel_args::{FeelArgs, law_name, refused_in_flags};
+use crate::cli::feel_args::{FeelArgs, refused_in_flags};
 use crate::cli::plot_args::{Plot, PlotArgs};
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
+use crate::feel_flags::{in_flags, law_name};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::feel_parameters::HARD_CEILING_MNM;
 use chalumeau_core::haptics::torque_law;
@@ -169,11 +170,7 @@ impl HapticCommand {
             feel.reference().written
         ))?;
         let design = self.felt.feel.design(&file)?;
-        table.comment(format_args!(
-            "feel {}; ceiling {} mNm",
-            self.felt.feel.in_flags(&design),
-            self.felt.ceiling
-        ))?;
+        table.comment(format_args!("feel {}; ceiling {} mNm", in_flags(&design), self.felt.ceiling))?;
         for note in feel.notes().iter().filter(wanted) {
             let asked = note.requirement;
             let pressure = |of: fn(&NoteRequirement) -> f64| asked.as_ref().map_or(f64::NAN, of);

@@ -1,11 +1,13 @@
 //! `chalumeau knob`: uses a knob without a DAW: watch it, feel a note on it, record a take.
 
-use crate::cli::feel_args::{ASKED_FOR, FeelArgs, refused_in_flags};
+use crate::cli::feel_args::{FeelArgs, refused_in_flags};
 use crate::cli::files;
 use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::cli::{Failure, INTERRUPTED};
-use crate::output::OutputError;
+use crate::feel_flags;
+use crate::output::{NewFile, OutputError, remove_unfinished_and_exit};
 use crate::take_file::TakeFile;
+use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
@@ -14,7 +16,7 @@ use chalumeau_knob::device::{
     OFFERED_CEILING_MNM, Phase, Release, StateSample, serial_text,
 };
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
-use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
+use chalumeau_knob::touch::take::{TakeHand, TakeMarks, TakeRow};
 use clap::{ArgGroup, Args};
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
@@ -104,6 +106,13 @@ struct WantedFeel {
     may_weaken: bool,
 }
 
+/// What a knob that is there gets.
+struct Settled {
+    note: NoteFeel,
+    /// What a take says of it.
+    remarks: Vec<String>,
+}
+
 impl WantedFeel {
     /// The feel of the note, and its design, weakened as far as the limits ask for and the user allows.
     fn under(&self, limits: &TorqueLimits) -> Result<(NoteFeel, FeelDesign), Failure> {
@@ -141,18 +150,8 @@ impl KnobCommand {
         // What is refused on any knob is refused before one is looked for.
         let (note, _) = wanted.under(&TorqueLimits { ceiling_mnm, ..TorqueLimits::default() })?;
         self.ask_again()?;
-        let take = match &self.record {
-            Some(path) => {
-                let remarks = [format!(
-                    "{written} (written {}) of {}{ASKED_FOR}{}",
-                    written.0,
-                    file.name,
-                    self.feel.in_flags(&wanted.design)
-                )];
-                Some(TakeFile::create(path, self.force, &remarks)?)
-            }
-            None => None,
-        };
+        let take = self.record.as_ref().map(|path| NewFile::create(path, self.force)).transpose()?;
+        let fingered = format!("{written} (written {}) of {}", written.0, file.name);
 
         let (rows, heard) = channel();
         // None until the knob has told its limits.
@@ -167,24 +166,35 @@ impl KnobCommand {
         let (link, _reader) = KnobLink::spawn("chalumeau knob", hooks);
         link.choose(self.choice());
         let settle = |status: &LinkStatus| {
-            let Some(info) = &status.info else { return Ok(note) };
+            let remarks = |design: &FeelDesign| {
+                let usual = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
+                let hand = TakeHand { design: usual, feels: true };
+                let freely = self.arm.is_none().then(|| "not armed: the knob turned freely".to_owned());
+                let always = [fingered.clone(), feel_flags::remark(design), hand.remark()];
+                always.into_iter().chain(freely).collect()
+            };
+            let as_asked = || Settled { note, remarks: remarks(&wanted.design) };
+            let Some(info) = &status.info else { return Ok(as_asked()) };
             let limits = info.torque_limits(ceiling_mnm.round() as u16);
             let (note, design) = match wanted.under(&limits) {
                 // It is only watched.
-                Err(_) if self.arm.is_none() => return Ok(note),
+                Err(_) if self.arm.is_none() => return Ok(as_asked()),
                 settled => settled?,
             };
+            let mut remarks: Vec<_> = remarks(&design);
             let (asked_mnm, strength_mnm) = (wanted.design.strength_mnm, design.strength_mnm);
             if strength_mnm < asked_mnm && self.arm.is_some() {
-                say!(
+                let weakened = format!(
                     "the feel is weakened from {asked_mnm:.0} to {strength_mnm:.0} mNm to stay below {:.0} mNm, which --arm and this knob allow",
                     limits.ceiling_mnm
                 );
+                say!("{weakened}");
+                remarks.push(weakened);
             }
             if let Ok(mut feel) = feel.lock() {
                 *feel = Some(note.feel);
             }
-            Ok(note)
+            Ok(Settled { note, remarks })
         };
         self.watch(&link, &heard, note, &settle, take)
     }
@@ -239,8 +249,8 @@ impl KnobCommand {
         link: &KnobLink,
         heard: &Receiver<StateSample>,
         mut note: NoteFeel,
-        settle: &dyn Fn(&LinkStatus) -> Result<NoteFeel, Failure>,
-        mut take: Option<TakeFile>,
+        settle: &dyn Fn(&LinkStatus) -> Result<Settled, Failure>,
+        mut file: Option<NewFile>,
     ) -> Result<(), Failure> {
         let closing_pa = Settings::default().closing_pa();
         let began = Instant::now();
@@ -251,6 +261,8 @@ impl KnobCommand {
         // The latest of a connected knob, whether it is lost now, and when it was.
         let (mut stats, mut is_lost, mut lost_s) = (LinkStats::default(), false, 0.0);
         let mut was_armed = false;
+        // Begins with the remarks on the feel, which the knob's limits decide.
+        let mut take = None;
         // This thread obeys the user: what it prints is what the user sees. When it waits for its terminal, it beats no more.
         let heart = link.heartbeat("this program");
         let [stop, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
@@ -260,7 +272,7 @@ impl KnobCommand {
             stopped.store(true, Ordering::Relaxed);
             std::thread::sleep(END_BY_FORCE);
             if !ending.load(Ordering::Relaxed) {
-                std::process::exit(INTERRUPTED);
+                remove_unfinished_and_exit(INTERRUPTED);
             }
         })
         .map_err(|e| Failure::Usage(format!("cannot listen for Ctrl-C: {e}")))?;
@@ -282,7 +294,9 @@ impl KnobCommand {
             // Where it stands decides whether it may be armed.
             if is_connected && live_since.is_none() && (self.arm.is_none() || status.angle_deg.is_some()) {
                 live_since = Some(Instant::now());
-                note = settle(&status)?;
+                let settled = settle(&status)?;
+                note = settled.note;
+                take = file.take().map(|file| TakeFile::begin(file, &settled.remarks)).transpose()?;
                 let stray_deg = status.stray_deg.filter(|_| !self.zero);
                 match (self.arm.is_some(), stray_deg) {
                     (true, Some(stray_deg)) => enter = Some(ask_for_enter(&Doubt::Stray(stray_deg))?),

@@ -13,6 +13,7 @@ use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
 use crate::cli::silent_keys::{hidden_in_chords, silent_notes};
 use crate::controllers::{ControllerMap, as_links};
+use crate::feel_flags;
 use crate::presets::{self, Preset};
 use crate::scale_file;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -30,7 +31,7 @@ use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::midi_file;
 use chalumeau_core::score::midi_file::Tracks;
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
-use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
@@ -251,11 +252,11 @@ impl ScoreArgs {
                     take.seconds()
                 ));
             }
-            let design = self.feel.design(&model.file)?;
+            let design = self.feel(&model.file)?;
             let recorded = self.breath.recorded_feel();
-            if let Some(flags) = recorded.filter(|flags| !self.feel.maps_like(&design, flags)) {
+            if let Some(flags) = recorded.filter(|flags| !feel_flags::map_alike(flags, &design)) {
                 warnings.push(format!(
-                    "the take was recorded with {flags}; this feel turns its angles into other pressures, unless you give the same flags"
+                    "the take was recorded with {flags}; the feel that you give turns its angles into other pressures"
                 ));
             }
             parts.events = self.replayed(take, &model, &settings, &parts)?;
@@ -358,9 +359,15 @@ impl ScoreArgs {
         RenderJob::without_score(&self.instrument, &self.settings, self.rate)
     }
 
-    /// The feel of the knob.
+    /// The feel of the knob: where no flag says otherwise, the one with which the take was recorded that is replayed.
     pub fn feel(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
-        self.feel.design(file)
+        let Some(flags) = self.breath.recorded_feel() else { return self.feel.design(file) };
+        let recorded = FeelArgs::recorded(&flags).map_err(|reason| {
+            Failure::Usage(format!(
+                "--replay: the take's line \"# feel {flags}\": {reason}; correct that line, or remove it"
+            ))
+        })?;
+        self.feel.or(recorded).design(file)
     }
 
     /// What is played, in a few words.
@@ -384,10 +391,10 @@ impl ScoreArgs {
         score: &Score<PartEvent>,
     ) -> Result<Vec<Timed<PartEvent>>, Failure> {
         let feels = InstrumentFeel::new(model);
-        let design = self.feel.design(&model.file)?;
+        let design = self.feel(&model.file)?;
         let table = feels.table(settings, &design, &NO_MOTOR)?;
         let knob = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
-        let hand = BreathMapping { maps: feels.maps_for(&table, settings), design: knob, feels: true };
+        let hand = take.mapping(feels.maps_for(&table, settings), knob);
         let rate_hz = f64::from(self.rate);
         let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
         let mut blower = Blower::default();

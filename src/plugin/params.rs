@@ -16,7 +16,7 @@ use crate::editor::WindowState;
 use crate::parameters::{InUse, Number, Value};
 use crate::plugin::host_link::HostLink;
 use crate::presets::Preset;
-use chalumeau_core::control::midi::breath::BreathFrom;
+use chalumeau_core::control::midi::breath::{BreathController, BreathFrom};
 use chalumeau_core::instrument::{Beyond, BreathResponse, Reach, Settings, Tuning};
 
 pub mod alterations;
@@ -324,7 +324,13 @@ pub enum BreathFromChoice {
 
 impl From<BreathFromChoice> for BreathFrom {
     fn from(choice: BreathFromChoice) -> Self {
-        Self::ALL[choice.to_index()]
+        match choice {
+            BreathFromChoice::Any => Self::Any,
+            BreathFromChoice::Breath => Self::Only(BreathController::Breath),
+            BreathFromChoice::Expression => Self::Only(BreathController::Expression),
+            BreathFromChoice::Pressure => Self::Only(BreathController::Pressure),
+            BreathFromChoice::Keys => Self::Keys,
+        }
     }
 }
 

@@ -77,7 +77,17 @@ impl PresetHandle {
     /// Waits until the program that was asked for is on the parameters. Only for renders of files.
     pub fn wait(&self) {
         let began = Instant::now();
-        while self.shared.program.load(Ordering::Acquire) != NONE && began.elapsed() < LONGEST_WAIT {
+        loop {
+            let asked = self.shared.program.load(Ordering::Acquire);
+            if asked == NONE {
+                return;
+            }
+            if began.elapsed() >= LONGEST_WAIT {
+                // Nobody will: the next blocks must not wait again.
+                let forgotten = (Ordering::AcqRel, Ordering::Relaxed);
+                let _ = self.shared.program.compare_exchange(asked, NONE, forgotten.0, forgotten.1);
+                return;
+            }
             std::thread::sleep(Duration::from_millis(1));
         }
     }
@@ -246,6 +256,19 @@ mod tests {
         keeper.handle().ask(127);
         keeper.handle().wait();
         assert_eq!(params.preset_name(), factory::all()[29].name, "there is no such preset");
+    }
+
+    #[test]
+    fn a_program_that_nobody_puts_is_waited_for_once() {
+        let shared = Arc::new(Shared {
+            program: AtomicU32::new(NONE),
+            shelf: Mutex::default(),
+            stop: AtomicBool::new(false),
+        });
+        let handle = PresetHandle { shared, tasks: mpsc::channel().0 };
+        handle.ask(3);
+        handle.wait();
+        assert_eq!(handle.shared.program.load(Ordering::Relaxed), NONE);
     }
 
     #[test]

@@ -104,20 +104,28 @@ impl Plugin for StandalonePlugin {
         _aux: &mut AuxiliaryBuffers,
         context: &mut impl ProcessContext<Self>,
     ) -> ProcessStatus {
+        let channels = buffer.as_slice();
         // Before the lock, which the JACK thread may want in this moment.
-        if self.uses_jack {
-            return ProcessStatus::KeepAlive;
-        }
-        devices::count_block();
-        // Nobody else holds it while the framework plays.
-        match self.plugin.try_lock() {
-            Ok(mut plugin) => {
-                let channels = buffer.as_slice();
-                // The framework has put what comes in where the sound goes out.
-                plugin.hear(&channels[..self.inputs.min(channels.len())]);
-                plugin.play::<Self>(channels, &mut WithKeyboards::new(context))
+        let status = if self.uses_jack {
+            ProcessStatus::Error("JACK plays")
+        } else {
+            devices::count_block();
+            // It is held elsewhere only while the program ends.
+            match self.plugin.try_lock() {
+                Ok(mut plugin) => {
+                    plugin.hear(&channels[..self.inputs.min(channels.len())]);
+                    plugin.play::<Self>(channels, &mut WithKeyboards::new(context))
+                }
+                Err(_) => ProcessStatus::Error("not playing"),
             }
-            Err(_) => ProcessStatus::KeepAlive,
+        };
+        match status {
+            ProcessStatus::Error(_) => {
+                // The framework has put what comes in where the sound goes out: a microphone.
+                channels.iter_mut().for_each(|channel| channel.fill(0.0));
+                ProcessStatus::KeepAlive
+            }
+            played => played,
         }
     }
 

@@ -6,7 +6,7 @@ use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Model, Probe, Settings};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_firmware::Setup;
-use chalumeau_knob::device::reader::{KnobReader, KnobWriter, Sample, ring};
+use chalumeau_knob::device::reader::{KnobReader, KnobWriter, ring};
 use chalumeau_knob::device::session::{HostSession, SessionEvent, SessionOutput};
 use chalumeau_knob::device::transport::Binding;
 use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
@@ -130,13 +130,7 @@ impl LoopPlayer {
         let writer = &mut self.writer;
         let mut tell = |happening: SessionEvent| {
             if let SessionEvent::State(state) = happening {
-                writer.push(Sample {
-                    host_us: state.host_us,
-                    angle_deg: state.angle_deg,
-                    velocity_deg_s: state.velocity_deg_s,
-                    flags: state.flags,
-                    period_us: state.period_us,
-                });
+                writer.push((&state).into());
             }
         };
         self.session.receive(now_us, &bytes, &mut tell);

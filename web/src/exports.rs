@@ -221,7 +221,7 @@ pub extern "C" fn chalumeau_begin_prepared(rate_hz: f64, file: u32) -> u32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn chalumeau_knob_open(number: u32, now_ms: f64) -> u32 {
     with(|playing| playing.set_knob(Some(Box::new(HeldKnob::new(number, now_ms)))));
-    given(|knob, out| knob.farewell(number, out))
+    given(|_, out| HeldKnob::farewell(number, out))
 }
 
 /// The port has been closed, or is gone.

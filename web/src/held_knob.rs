@@ -8,7 +8,7 @@
 use std::fmt::Write as _;
 
 use chalumeau_core::units::SoundingNote;
-use chalumeau_knob::device::pose::{Poses, Sample};
+use chalumeau_knob::device::pose::Poses;
 use chalumeau_knob::device::session::{HostSession, SessionEvent, SessionOutput, SessionStatus};
 use chalumeau_knob::device::transport::Binding;
 use chalumeau_knob::touch::feel::PlayedFeel;
@@ -30,24 +30,36 @@ pub struct HeldKnob {
     slap: Option<f32>,
     /// When the page last gave a sign of life, us.
     beat_us: i64,
+    clock: PageClock,
     now_us: i64,
     text: String,
 }
 
-/// Milliseconds of the page's clock as the session counts.
-fn us(now_ms: f64) -> i64 {
-    (1e3 * now_ms) as i64
+/// A step back of the page's clock by more than this is no late message: the system's clock was set, ms.
+const SET_BACK_MS: f64 = 1_000.0;
+
+/// The page's clock as the session counts. The only one that a page and its audio thread share is that of the system, which may
+/// be set back while a knob is armed; then it goes on from the latest moment.
+struct PageClock {
+    latest_ms: f64,
+    shift_ms: f64,
+}
+
+impl PageClock {
+    fn us(&mut self, now_ms: f64) -> i64 {
+        let before_ms = self.latest_ms - (now_ms + self.shift_ms);
+        if before_ms > SET_BACK_MS {
+            self.shift_ms += before_ms;
+        }
+        let at_ms = now_ms + self.shift_ms;
+        self.latest_ms = self.latest_ms.max(at_ms);
+        (1e3 * at_ms) as i64
+    }
 }
 
 fn told(poses: &mut Poses, slap: &mut Option<f32>, event: SessionEvent) {
     match event {
-        SessionEvent::State(state) => poses.take(Sample {
-            host_us: state.host_us,
-            angle_deg: state.angle_deg,
-            velocity_deg_s: state.velocity_deg_s,
-            flags: state.flags,
-            period_us: state.period_us,
-        }),
+        SessionEvent::State(state) => poses.take((&state).into()),
         SessionEvent::Slap(speed) => *slap = Some(speed),
         SessionEvent::Button(_) => {}
     }
@@ -56,7 +68,8 @@ fn told(poses: &mut Poses, slap: &mut Option<f32>, event: SessionEvent) {
 impl HeldKnob {
     /// A port that has just been opened; `number` is random. Allocates.
     pub fn new(number: u32, now_ms: f64) -> Self {
-        let now_us = us(now_ms);
+        let mut clock = PageClock { latest_ms: now_ms, shift_ms: 0.0 };
+        let now_us = clock.us(now_ms);
         Self {
             session: HostSession::new(Binding::Serial, number, now_us),
             poses: Poses::default(),
@@ -65,6 +78,7 @@ impl HeldKnob {
             baud: 0,
             slap: None,
             beat_us: now_us,
+            clock,
             now_us,
             text: String::new(),
         }
@@ -72,18 +86,18 @@ impl HeldKnob {
 
     /// The page lives and obeys the user.
     pub fn beat(&mut self, now_ms: f64) {
-        self.beat_us = us(now_ms);
+        self.beat_us = self.clock.us(now_ms);
     }
 
     /// Bytes of the port, and when the page read them.
     pub fn receive(&mut self, now_ms: f64, bytes: &[u8]) {
-        let Self { session, poses, slap, .. } = self;
-        session.receive(us(now_ms), bytes, &mut |event| told(poses, slap, event));
+        let Self { session, poses, slap, clock, .. } = self;
+        session.receive(clock.us(now_ms), bytes, &mut |event| told(poses, slap, event));
     }
 
     /// Lets time pass before a block of `frames` samples, with a note fingered.
     pub fn turn(&mut self, now_ms: f64, frames: usize, rate_hz: f64, note: Option<SoundingNote>) {
-        self.now_us = us(now_ms);
+        self.now_us = self.clock.us(now_ms);
         let Self { session, poses, slap, out, baud, .. } = self;
         session.obeyed(self.beat_us, PAGE);
         if self.played.maps.is_ready() {
@@ -152,7 +166,7 @@ impl HeldKnob {
     }
 
     /// Two frames that the page may write at any time, whoever stands still: FREE, then BYE.
-    pub fn farewell(&self, number: u32, taken: &mut Vec<u8>) {
+    pub fn farewell(number: u32, taken: &mut Vec<u8>) {
         taken.clear();
         for message in [Message::Free, Message::Bye { session: number }] {
             taken.extend_from_slice(&encode(&message, 0));
@@ -207,5 +221,20 @@ impl HeldKnob {
             let _ = write!(self.text, "{stray_deg:.1}");
         }
         &self.text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_is_set_back_goes_on() {
+        let mut clock = PageClock { latest_ms: 5_000.0, shift_ms: 0.0 };
+        assert_eq!(clock.us(90_000.0), 90_000_000);
+        assert_eq!(clock.us(89_995.0), 89_995_000, "a late message");
+        assert_eq!(clock.us(30_000.0), 90_000_000, "set back by a minute");
+        assert_eq!(clock.us(30_010.0), 90_010_000);
+        assert_eq!(clock.us(30_007.0), 90_007_000);
     }
 }

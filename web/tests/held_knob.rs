@@ -168,7 +168,7 @@ fn torque_ends_with_the_users_word_and_with_every_sign_of_life() {
     // What the page keeps ready ends torque without the session.
     session.arm();
     let mut farewell = Vec::new();
-    session.playing.knob().unwrap().farewell(7, &mut farewell);
+    HeldKnob::farewell(7, &mut farewell);
     session.knob.send(&farewell);
     session.runs = false;
     let took = session.free_ms();

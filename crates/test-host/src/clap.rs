@@ -400,11 +400,6 @@ impl Plugin {
         (packed != 0).then_some((size.width, size.height))
     }
 
-    /// Whether the window has closed by itself.
-    pub fn window_has_gone(&self) -> bool {
-        self.instance.access_shared_handler(|shared| shared.gone.load(Ordering::Acquire))
-    }
-
     /// How many voices the plugin has.
     pub fn voice_info(&mut self) -> Result<VoiceInfo> {
         let handle = self.instance.plugin_handle();

@@ -170,6 +170,8 @@ fn stock_firmware_plays_over_osc() {
     let _knob = Simulator::start(&["--osc", &format!("127.0.0.1:{port}"), "--hold", "200"]).unwrap();
     let mut plugin = plugin();
     chalumeau_test_host::knob_setup::listen(&mut plugin, port).unwrap();
+    // A ceiling that allows no feel: a knob without a motor makes no torque that could be too much.
+    edit(&mut plugin, |state| state["params"]["ceil"] = serde_json::json!({ "f32": 10.0 })).unwrap();
     let heard = plugin
         .session(RATE, BLOCK, |session| {
             wait_until_live(session, RATE).unwrap();
@@ -193,6 +195,10 @@ fn a_take_is_replayed_the_same_by_plugin_and_renderer() {
     edit(&mut plugin, |state| {
         state["fields"]["take"] = serde_json::to_string(&path.display().to_string()).unwrap().into();
         state["params"]["replay"] = serde_json::json!({ "bool": true });
+        // The rest of a knob that is not there, and a ceiling that allows no feel: the take has neither.
+        let other = serde_json::json!({ "rest_deg": 40.0, "travel_deg": 360.0, "dead_deg": [1.0, 0.5] });
+        state["fields"]["calibration"] = other.to_string().into();
+        state["params"]["ceil"] = serde_json::json!({ "f32": 10.0 });
     })
     .unwrap();
     plugin.set_offline(true).unwrap();

@@ -1,8 +1,8 @@
 //! The report's chapters "Breath" and "Haptics", for the instrument and the reed that were played.
 
-use crate::cli::feel_args::law_name;
 use crate::cli::render_job::RenderJob;
 use crate::cli::report::{number, word};
+use crate::feel_flags::law_name;
 use crate::parameters::{self, Kind};
 use chalumeau_core::haptics::torque_law::torque_mnm;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};

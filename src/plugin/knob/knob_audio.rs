@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use super::feel_design::{feel_design, knob_design};
 use super::feels_cache::FeelsCache;
 use super::heard_sound::SoundSender;
+use super::slow_work::from_zero;
 use super::take_recorder::load_take;
 use super::{NO_NOTE, SharedKnob};
 use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
@@ -17,9 +18,6 @@ use chalumeau_knob::device::{KnobReader, Release};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::NO_MOTOR;
 use chalumeau_knob::touch::take::Take;
-
-/// Breath values of one block that also go to the host: a block of 8192 samples has 128.
-const SENT_MOST: usize = 8_192 / GRID as usize;
 
 /// Where a block's breath comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +39,8 @@ pub struct KnobAudio {
     take: triple_buffer::Output<Option<Arc<Take>>>,
     blower: Blower,
     breath_from: BlockBreath,
-    sent: SentBreath,
+    /// The breath values of one block that go to the host. It never grows while it plays.
+    sent: Vec<(usize, Breath14)>,
     sound: SoundSender,
     /// Samples of a take that have been played.
     replayed: u64,
@@ -58,21 +57,6 @@ pub struct KnobAudio {
 struct PreparedReplay {
     hand: BreathMapping,
     take: Arc<Take>,
-}
-
-/// The breath values of one block that go to the host.
-struct SentBreath {
-    values: [(usize, Breath14); SENT_MOST],
-    count: usize,
-}
-
-impl SentBreath {
-    fn push(&mut self, at: usize, breath: Breath14) {
-        if let Some(place) = self.values.get_mut(self.count) {
-            *place = (at, breath);
-            self.count += 1;
-        }
-    }
 }
 
 /// What a block depends on, besides its events.
@@ -102,7 +86,7 @@ impl KnobAudio {
             take,
             blower: Blower::default(),
             breath_from: BlockBreath::Host,
-            sent: SentBreath { values: [(0, Breath14(0)); SENT_MOST], count: 0 },
+            sent: Vec::new(),
             sound,
             replayed: 0,
             prepared: None,
@@ -117,8 +101,10 @@ impl KnobAudio {
     }
 
     /// Loads the take to replay before playing begins, so that it plays from the first sample and every render of a file
-    /// is the same. Allocates; takes about half a second. [main thread]
-    pub fn prepare(&mut self, params: &ChalumeauParams, instrument: &SharedInstrument) {
+    /// is the same. Blocks have at most `longest` samples. Allocates; takes about half a second. [main thread]
+    pub fn prepare(&mut self, params: &ChalumeauParams, instrument: &SharedInstrument, longest: usize) {
+        // One for each point of the grid, and one where the knob falls silent.
+        self.sent = Vec::with_capacity(longest / GRID as usize + 2);
         self.shared.is_active.store(true, Ordering::Relaxed);
         (self.prepared, self.has_replayed) = (None, false);
         if !params.knob.replay.value() {
@@ -132,7 +118,7 @@ impl KnobAudio {
             return;
         };
         let maps = feels.maps_for(&table, &params.settings());
-        let hand = BreathMapping { maps, design: knob_design(&params.knob), feels: true };
+        let hand = take.mapping(maps, from_zero(knob_design(&params.knob)));
         self.prepared = Some(PreparedReplay { hand, take });
     }
 
@@ -182,7 +168,7 @@ impl KnobAudio {
                 shared.let_go(Release::Panic);
             }
         });
-        self.sent.count = 0;
+        self.sent.clear();
         let samples = out.len();
         match (std::mem::replace(&mut self.replays, context.replay), context.replay) {
             (false, true) => self.replayed = 0,
@@ -215,7 +201,9 @@ impl KnobAudio {
         let (shared, sent) = (&self.shared, &mut self.sent);
         let mut on_breath = |at: usize, breath: Breath14| {
             shared.breath.store(breath.unit().to_bits(), Ordering::Relaxed);
-            sent.push(at, breath);
+            if sent.len() < sent.capacity() {
+                sent.push((at, breath));
+            }
         };
         let blower = &mut self.blower;
         match (breath_from, take, reader) {
@@ -262,6 +250,6 @@ impl KnobAudio {
 
     /// The breath values of the last block and their sample positions, in order of time, for the host to record.
     pub fn sent(&self) -> &[(usize, Breath14)] {
-        &self.sent.values[..self.sent.count]
+        &self.sent
     }
 }

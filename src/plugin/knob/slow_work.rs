@@ -22,8 +22,8 @@ use chalumeau_core::instrument::Settings;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::LinkStatus;
 use chalumeau_knob::touch::breath_from_angle::BreathMapping;
-use chalumeau_knob::touch::feel::InstrumentFeel;
-use chalumeau_knob::touch::take::{Take, TakeRow};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
+use chalumeau_knob::touch::take::{Take, TakeHand, TakeRow};
 
 /// What the slow work tells the user.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,6 +38,25 @@ pub struct WorkTexts {
     pub take: Option<String>,
 }
 
+/// What a feel depends on.
+#[derive(Clone)]
+struct FeelInputs {
+    feels: Arc<InstrumentFeel>,
+    settings: Settings,
+    design: FeelDesign,
+    limits: TorqueLimits,
+    /// A motor makes torque.
+    is_felt: bool,
+}
+
+impl FeelInputs {
+    fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.feels, &other.feels)
+            && (self.settings, self.design, self.limits, self.is_felt)
+                == (other.settings, other.design, other.limits, other.is_felt)
+    }
+}
+
 /// The state of the thread.
 pub struct SlowWork {
     params: Arc<ChalumeauParams>,
@@ -48,11 +67,12 @@ pub struct SlowWork {
     hand: BreathMapping,
     take: triple_buffer::Input<Option<Arc<Take>>>,
     /// What the feel in force was computed from.
-    feel_inputs: Option<(Arc<InstrumentFeel>, Settings, FeelDesign, TorqueLimits)>,
+    feel_inputs: Option<FeelInputs>,
     /// Rows that the link's thread sends.
     rows: mpsc::Receiver<TakeRow>,
     recorder: TakeRecorder,
-    /// The take that is replayed; empty for none.
+    /// The take that is replayed, and its path; empty for none.
+    replayed: Option<Arc<Take>>,
     replay_path: String,
     texts: WorkTexts,
 }
@@ -78,6 +98,7 @@ impl SlowWork {
             feel_inputs: None,
             rows,
             recorder: TakeRecorder::new(sound),
+            replayed: None,
             replay_path: String::new(),
             texts: WorkTexts::default(),
         }
@@ -91,7 +112,7 @@ impl SlowWork {
             }
             std::thread::sleep(super::CYCLE);
         }
-        self.record(false);
+        self.record(false, None);
     }
 
     fn cycle(&mut self) {
@@ -102,9 +123,13 @@ impl SlowWork {
         if has_knob || knob.replay.value() {
             self.update_feel(&params, status.as_ref());
         }
-        self.update_replay();
+        let is_new = self.update_replay();
         self.update_hand(status.as_ref());
-        self.record(knob.record.value() && has_knob);
+        if is_new {
+            // After its hand.
+            self.take.write(self.replayed.clone());
+        }
+        self.record(knob.record.value() && has_knob, status.as_ref());
         self.texts.rows = self.recorder.rows();
         self.shared.tell(&self.texts);
     }
@@ -119,74 +144,90 @@ impl SlowWork {
             None => TorqueLimits { ceiling_mnm: f64::from(ceiling_mnm), ..TorqueLimits::default() },
         };
         let Some(feels) = self.feels_cache.of(&self.instrument) else { return };
-        let same = self.feel_inputs.as_ref().is_some_and(|(of, by, with, under)| {
-            Arc::ptr_eq(of, &feels) && (*by, *with, *under) == (settings, design, limits)
-        });
-        if same {
+        let is_felt = status.is_some_and(makes_torque);
+        let inputs = FeelInputs { feels, settings, design, limits, is_felt };
+        if self.feel_inputs.as_ref().is_some_and(|before| before.is_same(&inputs)) {
             return;
         }
-        self.feel_inputs = Some((feels.clone(), settings, design, limits));
+        self.feel_inputs = Some(inputs.clone());
         self.texts.short_breath = short_breath(&settings);
+        let FeelInputs { feels, .. } = inputs;
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
                 let in_force = FeelInForce::new(feels, table, &settings);
                 self.hand.maps = in_force.maps();
-                self.hand_in.write(self.hand);
                 if let Ok(mut feel) = self.shared.feel.lock() {
                     *feel = Some(Arc::new(in_force));
                 }
                 self.texts.refused = None;
             }
-            // The old feel stays, and its angles keep their breath.
-            Err(reason) => self.texts.refused = Some(format!("feel unchanged: {reason}")),
+            Err(reason) => {
+                self.texts.refused = Some(format!("feel unchanged: {reason}"));
+                // A motor keeps its feel, whose angles keep their breath. Without one, no torque is too much.
+                let in_force = self.shared.feel_in_force().filter(|_| is_felt);
+                self.hand.maps = match (in_force, feels.table(&settings, &design, &NO_MOTOR)) {
+                    (Some(in_force), _) => in_force.maps(),
+                    (None, Ok(table)) => feels.maps_for(&table, &settings),
+                    (None, Err(_)) => return,
+                };
+            }
         }
+        self.hand_in.write(self.hand);
     }
 
-    fn update_hand(&mut self, status: Option<&LinkStatus>) {
+    /// How the angles blow of the knob that is there.
+    fn hand_of(&self, status: Option<&LinkStatus>) -> TakeHand {
         let feels = status.is_none_or(|status| status.tier > 0);
         let design = knob_design(&self.params.knob);
         // A knob that feels counts from its own zero. The rest of another, which counts from where it was switched on, is none of
         // its own.
         let is_felt = status.is_some_and(|status| status.tier > 0);
-        let design = if is_felt { from_zero(design) } else { design };
+        TakeHand { design: if is_felt { from_zero(design) } else { design }, feels }
+    }
+
+    fn update_hand(&mut self, status: Option<&LinkStatus>) {
+        let usual = from_zero(knob_design(&self.params.knob));
+        let TakeHand { design, feels } = match &self.replayed {
+            Some(take) => take.hand(usual),
+            None => self.hand_of(status),
+        };
         if (self.hand.design, self.hand.feels) != (design, feels) {
             (self.hand.design, self.hand.feels) = (design, feels);
             self.hand_in.write(self.hand);
         }
     }
 
-    /// Loads the take to replay, if that has changed.
-    fn update_replay(&mut self) {
+    /// Loads the take to replay, if that has changed; then true.
+    fn update_replay(&mut self) -> bool {
         let knob = &self.params.knob;
         let path = match knob.take.read() {
             Ok(path) if knob.replay.value() => path.clone(),
             _ => String::new(),
         };
         if path == self.replay_path {
-            return;
+            return false;
         }
         self.replay_path.clone_from(&path);
         self.texts.take = None;
         let take = (!path.is_empty()).then(|| load_take(&path)).transpose();
-        match take {
-            Ok(take) => self.take.write(take),
-            Err(reason) => {
-                self.texts.take = Some(reason);
-                self.take.write(None);
-            }
-        }
+        self.replayed = take.unwrap_or_else(|reason| {
+            self.texts.take = Some(reason);
+            None
+        });
+        true
     }
 
     /// Records the rows that have come while `wanted`; otherwise completes the take. *Record take* stays on only while it can
     /// record.
-    fn record(&mut self, wanted: bool) {
+    fn record(&mut self, wanted: bool, status: Option<&LinkStatus>) {
         let rows: Vec<TakeRow> = self.rows.try_iter().collect();
         let (moments, has_knob) = (&self.params.moments, self.params.knob.kind.value() != KnobKind::Off);
         if moments.take(Moment::Record) && !has_knob {
             self.texts.take = Some("nothing to record: choose a knob first".to_owned());
         }
         moments.set_possible(Moment::Record, has_knob);
-        if wanted && let Err(reason) = self.recorder.begin(&self.params) {
+        let hand = self.hand_of(status);
+        if wanted && let Err(reason) = self.recorder.begin(&self.params, hand) {
             self.params.moments.set_possible(Moment::Record, false);
             self.texts.take = Some(reason);
             return;
@@ -214,8 +255,13 @@ impl SlowWork {
     }
 }
 
+/// Whether the hand may feel a torque of the knob: its own motor's, or one by way of a bridge.
+fn makes_torque(status: &LinkStatus) -> bool {
+    status.info.is_some() || status.armed
+}
+
 /// The same way to full breath, from zero.
-fn from_zero(design: KnobDesign) -> KnobDesign {
+pub(super) fn from_zero(design: KnobDesign) -> KnobDesign {
     KnobDesign { zero_deg: 0.0, full_deg: design.full_deg - design.zero_deg, ..design }
 }
 
@@ -237,9 +283,7 @@ mod tests {
     fn the_rest_of_another_knob_takes_nothing_from_one_that_feels() {
         let design = KnobDesign { zero_deg: 40.0, full_deg: 400.0, ..KnobDesign::default() };
         let feels = InstrumentFeel::built_in().unwrap();
-        let table = feels
-            .table(&Settings::default(), &FeelDesign::default(), &chalumeau_knob::touch::feel::NO_MOTOR)
-            .unwrap();
+        let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
         let breath = |design| {
             let hand = BreathMapping { maps: feels.maps(&table), design, feels: true };
             Blower::default().blow(&hand, 200.0, 6_000.0).unwrap()

@@ -7,11 +7,13 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::feel_design::feel_design;
 use super::heard_sound::SoundListener;
+use crate::feel_flags;
+use crate::output::NewFile;
 use crate::plugin::params::ChalumeauParams;
 use crate::take_file::TakeFile;
 use chalumeau_core::instrument::Settings;
 use chalumeau_knob::touch::study::{StudySide, plan};
-use chalumeau_knob::touch::take::{Take, TakeMarks, TakeRow};
+use chalumeau_knob::touch::take::{Take, TakeHand, TakeMarks, TakeRow};
 
 /// Environment variable that names another folder for takes.
 const TAKES: &str = "CHALUMEAU_TAKES";
@@ -43,10 +45,10 @@ impl TakeRecorder {
         Self { recording: None, sound, waiting: VecDeque::new() }
     }
 
-    /// Opens a new take, if none is open.
-    pub fn begin(&mut self, params: &ChalumeauParams) -> Result<(), String> {
+    /// Opens a new take of this hand, if none is open.
+    pub fn begin(&mut self, params: &ChalumeauParams, hand: TakeHand) -> Result<(), String> {
         if self.recording.is_none() {
-            self.recording = Some(create(params)?);
+            self.recording = Some(create(params, hand)?);
         }
         Ok(())
     }
@@ -123,7 +125,7 @@ pub fn marks(params: &ChalumeauParams, settings: &Settings) -> TakeMarks {
 }
 
 /// Creates a new take in the folder of takes.
-fn create(params: &ChalumeauParams) -> Result<Recording, String> {
+fn create(params: &ChalumeauParams, hand: TakeHand) -> Result<Recording, String> {
     let folder = match std::env::var_os(TAKES) {
         Some(folder) => PathBuf::from(folder),
         None => dirs::document_dir()
@@ -146,19 +148,32 @@ fn create(params: &ChalumeauParams) -> Result<Recording, String> {
         })
         .find(|path| !path.exists())
         .ok_or_else(|| format!("{} has too many takes of this second", folder.display()))?;
-    let writer = TakeFile::create(&path, false, &remarks(params)).map_err(|reason| reason.to_string())?;
+    let begun = NewFile::create(&path, false).and_then(|file| TakeFile::begin(file, &remarks(params, hand)));
+    let writer = begun.map_err(|reason| reason.to_string())?;
     Ok(Recording { writer, path, rows: 0, error: None })
 }
 
-/// The lines above a take's columns: program, feel, and the order of the study's trials.
-fn remarks(params: &ChalumeauParams) -> Vec<String> {
+/// The lines above a take's columns: program, feel and hand at the beginning, and the order of the study's trials.
+fn remarks(params: &ChalumeauParams, hand: TakeHand) -> Vec<String> {
     let knob = &params.knob;
+    let feel = feel_design(knob);
     let mut remarks = vec![
         format!(
             "Chalumeau {} take; t_us and heard_us are the host's clock, angle from the knob's zero",
             env!("CARGO_PKG_VERSION")
         ),
-        format!("feel {:?}", feel_design(knob)),
+        feel_flags::remark(&feel),
+        hand.remark(),
+        format!(
+            "damping {} mNm s/rad, friction {} mNm, wall {} mNm per degree from {} of the angle of closure, \
+             slap {} mNm per degree, a change takes {} ms",
+            feel.damping_mnms as f32,
+            feel.friction_mnm as f32,
+            feel.wall_mnm_per_deg as f32,
+            feel.wall_share as f32,
+            feel.slap_mnm_per_deg as f32,
+            feel.morph_ms
+        ),
     ];
     if let Some((participant, ..)) = knob.study() {
         let seed = knob.seed.value();

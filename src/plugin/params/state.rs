@@ -47,9 +47,11 @@ pub(super) fn first_preset() -> String {
 /// dropped, and what the state does not mention set to its default, so that a state means the same in every session.
 pub fn mend(state: &mut PluginState) {
     let mut old = std::mem::take(&mut state.params);
-    keep_the_feel(&mut old);
     // A state without a layout, or with a broken one, was written by hand: it means what a new one does.
     let schema = state.fields.get(SCHEMA_FIELD).and_then(|text| text.parse::<u32>().ok());
+    if schema.is_some() {
+        keep_the_feel(&mut old);
+    }
     for (id, was, since) in BEFORE {
         if schema.is_some_and(|schema| schema < since) {
             // What was saved then goes on sounding as it did.
@@ -100,8 +102,8 @@ pub fn without_moments(state: &mut PluginState) {
     }
 }
 
-/// A state from before *Feel place* and *Feel mark* feels as it did: its *Feel contrast* moved the angles too, and the flow law
-/// had no mark.
+/// A state that was saved before *Feel place* and *Feel mark* were there feels as it did: its *Feel contrast* moved the angles too,
+/// and the flow law had no mark.
 fn keep_the_feel(old: &mut BTreeMap<String, ParamValue>) {
     let Some(ParamValue::F32(contrast)) = old.get("contr") else { return };
     let contrast = *contrast;
@@ -331,11 +333,17 @@ mod tests {
     fn a_state_from_before_place_and_mark_feels_as_it_did() {
         let old = [("contr", 5.0)];
         let new = [("contr", 5.0), ("place", 2.0), ("mark", 8.0)];
-        for (saved, wanted) in
-            [(&old[..], [5.0, 5.0, 0.0]), (&new[..], [5.0, 2.0, 8.0]), (&[], [3.0, 1.0, 9.0])]
-        {
+        for (schema, saved, wanted) in [
+            (Some("4"), &old[..], [5.0, 5.0, 0.0]),
+            (Some("5"), &new[..], [5.0, 2.0, 8.0]),
+            // By hand.
+            (None, &old[..], [5.0, 1.0, 9.0]),
+            (None, &[], [3.0, 1.0, 9.0]),
+        ] {
             let params = saved.iter().map(|&(id, value)| (id.to_owned(), ParamValue::F32(value))).collect();
-            let mut state = PluginState { version: String::new(), params, fields: BTreeMap::new() };
+            let fields =
+                schema.map(|schema| (SCHEMA_FIELD.to_owned(), schema.to_owned())).into_iter().collect();
+            let mut state = PluginState { version: String::new(), params, fields };
             mend(&mut state);
             for (id, wanted) in ["contr", "place", "mark"].into_iter().zip(wanted) {
                 assert!(

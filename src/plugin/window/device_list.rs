@@ -10,8 +10,6 @@ use chalumeau_knob::device::{
     Candidate, LinkStatus, Phase, RuntimeDir, candidates, lock, midi, serial_number, serial_text,
 };
 
-/// Number of device kinds that the parameter *Knob* offers.
-pub const KINDS: usize = 4;
 /// Key of the entry for OSC.
 const OSC: &str = "osc";
 /// Prefix of the key of a MIDI port.
@@ -117,7 +115,7 @@ fn found_device(places: &RuntimeDir, candidate: &Candidate) -> KnobDevice {
 }
 
 /// Stores the choice of a device in the parameters. Returns the value of *Knob*, which the caller must set.
-pub fn choose(handles: &SharedHandles, key: &str) -> Option<usize> {
+pub fn choose(handles: &SharedHandles, key: &str) -> KnobKind {
     let knob = &handles.params.knob;
     let store = |text: &std::sync::RwLock<String>, word: &str| {
         let mut text = text.write().unwrap_or_else(PoisonError::into_inner);
@@ -134,7 +132,7 @@ pub fn choose(handles: &SharedHandles, key: &str) -> Option<usize> {
         KnobKind::Serial
     };
     handles.knob.choose_device_again();
-    Some(kind as usize)
+    kind
 }
 
 #[cfg(test)]

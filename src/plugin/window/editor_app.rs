@@ -5,6 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use nice_plug::context::gui::GuiContext;
+#[cfg(feature = "devices")]
+use nice_plug::params::enums::Enum;
 use nice_plug_egui::baseview::{HandlerError, WindowSize};
 use nice_plug_egui::{Frame, KeyCapture, NiceEguiApp};
 
@@ -17,6 +19,8 @@ use crate::plugin::SharedHandles;
 use crate::plugin::launch_options::{DeviceTask, LaunchOptions};
 use crate::plugin::params::ChalumeauParams;
 use crate::plugin::params::instrument::InstrumentChoice;
+#[cfg(feature = "devices")]
+use crate::plugin::params::knob::KnobKind;
 use crate::plugin::params::scale::SavedScale;
 use crate::plugin::preset_keeper::PresetTask;
 use chalumeau_core::bore::fingering_finder;
@@ -141,9 +145,8 @@ impl WindowMemory {
             }
             #[cfg(feature = "devices")]
             Action::ChooseDevice(key) => {
-                if let Some(kind) = super::device_list::choose(&self.handles, &key) {
-                    self.choose("knob", kind, super::device_list::KINDS, gui);
-                }
+                let kind = super::device_list::choose(&self.handles, &key);
+                self.choose("knob", kind.to_index(), KnobKind::variants().len(), gui);
             }
             #[cfg(feature = "devices")]
             Action::FeelTest(feel) => self.handles.knob.test(feel),

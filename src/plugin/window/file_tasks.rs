@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::editor::Snapshot;
 use crate::folder_listing::FolderListing;
+use crate::output::{NewFile, OutputError};
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 
@@ -71,17 +72,21 @@ const NUMBERS_MOST: usize = 1_000;
 fn save(file: &InstrumentFile, folder: &Path) -> Result<PathBuf, String> {
     let refused = |reason: std::io::Error| format!("cannot save in {}: {reason}", folder.display());
     fs::create_dir_all(folder).map_err(refused)?;
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
-    let name = file.name.chars().map(plain).collect::<String>().replace("__", "_");
-    let mut written = tempfile::NamedTempFile::new_in(folder).map_err(refused)?;
-    written.write_all(file.to_toml().as_bytes()).map_err(refused)?;
+    let words = file.name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    let name = words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("_");
+    let name = if name.is_empty() { "instrument" } else { &name };
     for number in 1..=NUMBERS_MOST {
         let path = folder.join(format!("{name}_{number}.toml"));
-        match written.persist_noclobber(&path) {
-            Ok(_) => return Ok(path),
-            Err(taken) if taken.error.kind() == std::io::ErrorKind::AlreadyExists => written = taken.file,
-            Err(failed) => return Err(refused(failed.error)),
-        }
+        let mut written = match NewFile::create(&path, false) {
+            Ok(written) => written,
+            Err(OutputError::Exists(_)) => continue,
+            Err(failed) => return Err(failed.to_string()),
+        };
+        written.write_all(file.to_toml().as_bytes()).map_err(refused)?;
+        return match written.keep() {
+            Ok(()) => Ok(path),
+            Err(failed) => Err(failed.to_string()),
+        };
     }
     Err(format!("{} has {NUMBERS_MOST} instruments called {name}; delete some", folder.display()))
 }
@@ -102,6 +107,8 @@ mod tests {
             assert_eq!(InstrumentFile::parse(&fs::read_to_string(path).unwrap()).unwrap(), file);
         }
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 2, "nothing else is left there");
+        let foreign = InstrumentFile { name: "\u{43a}".to_owned(), ..file.clone() };
+        assert!(save(&foreign, &folder).unwrap().ends_with("instrument_1.toml"));
         let none = folder.join("b_flat_altered_1.toml/within");
         assert!(save(&file, &none).unwrap_err().contains("cannot save in"));
     }

@@ -69,9 +69,18 @@ impl InstrumentAnalysis {
         }
     }
 
-    /// Whether this is the analysis of that instrument.
+    /// Whether this is the analysis of that instrument, however it is tuned now. Tuning keeps the bore's coefficients, and what takes
+    /// long here depends on nothing that it changes.
     pub fn is_of(&self, current: &CurrentInstrument) -> bool {
-        self.drawn.is_of(current)
+        Arc::ptr_eq(&self.drawn.model.coeffs, &current.model.coeffs)
+    }
+
+    /// Takes over how that instrument is tuned now.
+    pub fn follow(&mut self, current: &CurrentInstrument) {
+        if !self.drawn.is_of(current) {
+            self.drawn = DrawnInstrument::new(current);
+            self.standing_wave = None;
+        }
     }
 
     /// The instrument.

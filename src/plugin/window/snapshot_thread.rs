@@ -257,7 +257,11 @@ impl SnapshotThread {
             self.analysis = done.join().ok().or_else(|| self.analysis.take());
         }
         let Some(current) = current else { return };
-        let is_known = self.analysis.as_ref().is_some_and(|analysis| analysis.is_of(current));
+        let known = self.analysis.as_mut().filter(|analysis| analysis.is_of(current));
+        let is_known = known.is_some();
+        if let Some(known) = known {
+            known.follow(current);
+        }
         if current.readiness > Readiness::Rough && !is_known && self.analysing.is_none() {
             let current = current.clone();
             let analysing = std::thread::Builder::new().name("InstrumentAnalysis".to_owned());

@@ -13,6 +13,7 @@ use nice_plug::prelude::*;
 use super::client::{
     Connection, Health, JackClient, MICROPHONE, MIDI_INPUT, MIDI_OUTPUT, OUTPUTS, PlayingClient,
 };
+use super::player::LONGEST_CYCLE;
 use crate::plugin::Chalumeau;
 use crate::plugin::launch_options::LaunchOptions;
 
@@ -143,8 +144,7 @@ fn start_plugin(plugin: &Mutex<Chalumeau>, sample_rate: f32) -> bool {
     let config = BufferConfig {
         sample_rate,
         min_buffer_size: None,
-        // JACK allows no longer cycles.
-        max_buffer_size: 8_192,
+        max_buffer_size: LONGEST_CYCLE,
         process_mode: ProcessMode::Realtime,
     };
     plugin.lock().unwrap_or_else(PoisonError::into_inner).start::<Chalumeau>(&config, &mut NoHost)

@@ -12,9 +12,13 @@ use nice_plug::midi::MidiResult;
 use nice_plug::prelude::*;
 
 use crate::plugin::Chalumeau;
+use crate::standalone::devices;
+use chalumeau_knob::touch::breath_from_angle::GRID;
 
-/// Events that one cycle can send: the breath of a knob, twice each 64 samples, in the longest cycle of 8192 samples.
-const SENT_MOST: usize = 2 * 8_192 / 64;
+/// Longest cycle of a JACK server, samples.
+pub const LONGEST_CYCLE: u32 = 8_192;
+/// Events that one cycle can send: the breath of a knob, two for each value, in the longest cycle.
+const SENT_MOST: usize = 2 * LONGEST_CYCLE as usize / GRID as usize;
 
 /// What the JACK thread tells the link thread.
 #[derive(Debug, Default)]
@@ -87,6 +91,7 @@ impl JackPlayer {
 impl jack::ProcessHandler for JackPlayer {
     fn process(&mut self, _: &Client, scope: &ProcessScope) -> Control {
         self.signs.cycles.fetch_add(1, Ordering::Relaxed);
+        devices::count_block();
         // A debug build checks this, as in the framework's own backends.
         nice_assert_no_alloc::assert_no_alloc(|| self.play(scope));
         Control::Continue

@@ -115,7 +115,10 @@ impl FeelRefused {
                 "{note} would be felt to start at {a_on_deg:.0} degrees, too near closure at {a_close_deg:.0}"
             ),
             Self::Ceiling { note, wanted_mnm, ceiling_mnm, .. } => {
-                format!("{note} would need {:.0} mNm, the ceiling is {ceiling_mnm:.0}", wanted_mnm.ceil())
+                format!(
+                    "{note} would need {:.0} mNm with mark and friction, the ceiling is {ceiling_mnm:.0}",
+                    wanted_mnm.ceil()
+                )
             }
             Self::Stiffness { note, wanted, limit } => {
                 format!(

@@ -9,6 +9,7 @@
 //! Without clocks and threads: time goes in. Real-time safe.
 
 use crate::device::clock::ClockFit;
+use crate::device::session::StateSample;
 
 /// Samples kept for interpolation: half a second at 500 Hz, above the delay at any block size below 0.4 s.
 const KEPT: usize = 256;
@@ -40,10 +41,15 @@ pub struct Sample {
     pub angle_deg: f32,
     /// Degrees per second.
     pub velocity_deg_s: f32,
-    /// `wire::Flags` as sent; 0 from unmodified firmware.
-    pub flags: u16,
     /// Time until the next sample as a rule, us.
     pub period_us: u32,
+}
+
+impl From<&StateSample> for Sample {
+    fn from(state: &StateSample) -> Self {
+        let &StateSample { host_us, angle_deg, velocity_deg_s, period_us, .. } = state;
+        Self { host_us, angle_deg, velocity_deg_s, period_us }
+    }
 }
 
 /// Where the knob is at one sample of sound.
@@ -141,11 +147,6 @@ impl Poses {
         }
         let at_us = self.block_us + (offset as f64 / self.rate_hz * 1e6) as i64;
         Some(self.pose_at(at_us))
-    }
-
-    /// The latest sample as it came, for a state that has no use for the delay.
-    pub fn latest(&self) -> Option<Sample> {
-        self.is_live.then(|| self.kept[self.newest])
     }
 
     /// The newest is 0.

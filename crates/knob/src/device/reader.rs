@@ -79,11 +79,6 @@ impl KnobReader {
     pub fn take_slap(&mut self) -> Option<f32> {
         std::iter::from_fn(|| self.slaps.pop().ok()).last()
     }
-
-    /// The latest sample as it came, for a state that has no use for the delay.
-    pub fn latest(&self) -> Option<Sample> {
-        self.poses.latest()
-    }
 }
 
 #[cfg(test)]
@@ -131,7 +126,6 @@ mod tests {
                     host_us: clock.host_us(t_us).unwrap(),
                     angle_deg,
                     velocity_deg_s: 1000.0,
-                    flags: 0,
                     period_us: 2000,
                 });
             }
@@ -162,7 +156,7 @@ mod tests {
     }
 
     fn sample(host_us: i64, angle_deg: f32) -> Sample {
-        Sample { host_us, angle_deg, velocity_deg_s: 100.0, flags: 0, period_us: 2000 }
+        Sample { host_us, angle_deg, velocity_deg_s: 100.0, period_us: 2000 }
     }
 
     #[test]

@@ -1,8 +1,11 @@
 //! Takes: what a hand did on a knob, to be replayed and analysed. [`take_csv`](crate::touch::take_csv) reads and writes
 //! them.
 
+use crate::touch::breath_from_angle::BreathMapping;
+use crate::touch::feel::PitchMaps;
 use crate::touch::heard::Heard;
 use crate::touch::study::{Condition, StudySide};
+use chalumeau_core::control::knob::KnobDesign;
 
 /// One row of a take: one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,16 +39,37 @@ pub struct TakeMarks {
     pub heard: Heard,
 }
 
+/// How the angles of a take blow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TakeHand {
+    /// Rest, full blow, dead zone and curve.
+    pub design: KnobDesign,
+    /// True if the knob gave the feel, as in [`BreathMapping`].
+    pub feels: bool,
+}
+
 /// A take in memory, never empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Take {
     pub(super) rows: Vec<TakeRow>,
+    pub(super) hand: Option<TakeHand>,
 }
 
 impl Take {
     /// All rows, in order of time; there is at least one.
     pub fn rows(&self) -> &[TakeRow] {
         &self.rows
+    }
+
+    /// How its angles blow: as it says or, where it says nothing, with `usual` on a knob that gave the feel.
+    pub fn hand(&self, usual: KnobDesign) -> TakeHand {
+        self.hand.unwrap_or(TakeHand { design: usual, feels: true })
+    }
+
+    /// What its angles mean on an instrument with these maps; `usual` as in [`hand`](Self::hand).
+    pub fn mapping(&self, maps: PitchMaps, usual: KnobDesign) -> BreathMapping {
+        let TakeHand { design, feels } = self.hand(usual);
+        BreathMapping { maps, design, feels }
     }
 
     /// Length, s.

@@ -2,11 +2,12 @@
 //!
 //! The first line names the columns; lines that begin with `#` are comments. `t_us` and `angle_deg` are required, at any
 //! place; the other columns may be missing or empty. Unknown columns are ignored. Time may start anywhere but must not
-//! go back; a replay starts at the first row.
+//! go back; a replay starts at the first row. A comment `# hand` above the columns says how the angles blow.
 
 use crate::touch::study::StudySide;
-use crate::touch::take::{Take, TakeMarks, TakeRow};
-use std::io::{self, Read, Write};
+use crate::touch::take::{Take, TakeHand, TakeMarks, TakeRow};
+use chalumeau_core::control::knob::KnobDesign;
+use std::io::{self, BufRead, BufReader, Read, Write};
 
 /// Column names in the order they are written.
 pub const HEADER: &str = "t_us,angle_deg,velocity_deg_s,torque_mnm,written_midi,gamma,feel_id,h,k,\
@@ -17,6 +18,11 @@ const MOST_ROWS: usize = 18_000_000;
 const MOST_DEG: f64 = 36_000.0;
 /// Largest magnitude of any other number; only keeps out what no knob measures.
 const MOST_MEASURED: f64 = 1e9;
+
+/// How a comment about the hand begins.
+const HAND: &str = "hand ";
+/// Most bytes of the comments above the columns that are read as such.
+const HEAD_MOST: u64 = 65_536;
 
 /// Why a file cannot be read as a take. Lines count from 1.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +52,9 @@ pub enum TakeError {
         /// Time of this row, us.
         now: u64,
     },
+    /// The comment about the hand.
+    #[error("`{0}` does not say how the angles blow; correct that line, or remove it")]
+    Hand(String),
     /// No rows.
     #[error("the take has no rows")]
     Empty,
@@ -60,6 +69,16 @@ pub enum TakeError {
 impl Take {
     /// Reads a take from a CSV file. The first error ends the reading; its text names the line.
     pub fn read(from: impl Read) -> Result<Self, TakeError> {
+        let mut from = BufReader::new(from);
+        let mut head = Vec::new();
+        let broken = csv::Error::from;
+        while (head.len() as u64) < HEAD_MOST && from.fill_buf().map_err(broken)?.first() == Some(&b'#') {
+            from.by_ref().take(HEAD_MOST).read_until(b'\n', &mut head).map_err(broken)?;
+        }
+        let comments = String::from_utf8_lossy(&head).into_owned();
+        let hand = comments.lines().find_map(TakeHand::read).transpose()?;
+        // The reader counts the lines.
+        let from = head.chain(from);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
@@ -78,7 +97,38 @@ impl Take {
             }
             rows.push(row);
         }
-        if rows.is_empty() { Err(TakeError::Empty) } else { Ok(Self { rows }) }
+        if rows.is_empty() { Err(TakeError::Empty) } else { Ok(Self { rows, hand }) }
+    }
+}
+
+impl TakeHand {
+    /// The comment that says it, without its `#`.
+    pub fn remark(&self) -> String {
+        let KnobDesign { zero_deg, full_deg, curve, dead_on_deg, dead_off_deg } = self.design;
+        let feels = self.feels;
+        format!(
+            "{HAND}zero_deg={zero_deg} full_deg={full_deg} curve={curve} dead_on_deg={dead_on_deg} \
+             dead_off_deg={dead_off_deg} feels={feels}"
+        )
+    }
+
+    /// Reads a line, if it is that comment.
+    fn read(line: &str) -> Option<Result<Self, TakeError>> {
+        let said = line.strip_prefix('#')?.trim_start().strip_prefix(HAND)?;
+        let value = |name: &str| said.split(' ').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='));
+        let number = |name| value(name)?.parse::<f64>().ok();
+        let read = || {
+            let design = KnobDesign {
+                zero_deg: number("zero_deg")?,
+                full_deg: number("full_deg")?,
+                curve: number("curve")?,
+                dead_on_deg: number("dead_on_deg")?,
+                dead_off_deg: number("dead_off_deg")?,
+            };
+            design.check().ok()?;
+            Some(Self { design, feels: value("feels")?.parse().ok()? })
+        };
+        Some(read().ok_or_else(|| TakeError::Hand(line.to_owned())))
     }
 }
 
@@ -288,6 +338,22 @@ mod tests {
     }
 
     #[test]
+    fn a_take_says_how_its_angles_blow() {
+        let usual = KnobDesign::default();
+        let design = KnobDesign { zero_deg: 40.5, full_deg: 400.0, curve: 2.0, ..usual };
+        let hand = TakeHand { design, feels: false };
+        let mut writer = TakeWriter::new(Vec::new(), &["C4".to_owned(), hand.remark()]).unwrap();
+        writer.write(&TakeRow::default(), &TakeMarks::default()).unwrap();
+        assert_eq!(Take::read(&*writer.into_inner()).unwrap().hand(usual), hand);
+        let silent = read("t_us,angle_deg\n0,1\n").unwrap();
+        assert_eq!(silent.hand(design), TakeHand { design, feels: true });
+        for wrong in [hand.remark().replace("curve=2", "curve=9"), "hand over".to_owned()] {
+            let error = read(&format!("# {wrong}\nt_us,angle_deg\n0,1\n")).unwrap_err().to_string();
+            assert!(error.contains(&wrong), "{error}");
+        }
+    }
+
+    #[test]
     fn two_columns_are_enough_and_the_angle_runs_between_rows() {
         let take = read("# by hand\nangle_deg, t_us\n0,0\n10,1000\n10,1000\n30,3000\n").unwrap();
         for (t_s, angle_deg) in [(-1.0, 0.0), (0.0, 0.0), (0.0005, 5.0), (0.002, 20.0), (9.0, 30.0)] {
@@ -304,6 +370,7 @@ mod tests {
             ("t_us,angle_deg\n1,2\nx,3\n", "line 3: t_us is `x`"),
             ("t_us,angle_deg\n1,nan\n", "line 2: angle_deg is `nan`"),
             ("t_us,angle_deg\n1,1e9\n", "within 100 turns"),
+            ("# a\n# b\nt_us,angle_deg\n1,1e9\n", "line 4"),
             ("t_us,angle_deg\n5,1\n4,1\n", "line 3: t_us goes back from 5 to 4"),
             ("t_us,angle_deg,written_midi\n5,1,300\n", "written_midi is `300`"),
             ("t_us,angle_deg,gamma\n5,1,loud\n", "gamma is `loud`"),

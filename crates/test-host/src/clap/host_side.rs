@@ -24,8 +24,6 @@ pub struct Shared {
     pub(super) callback: AtomicBool,
     /// Size the window wants to have, packed; 0 when nothing is asked for.
     pub(super) size: AtomicU64,
-    /// The window has gone by itself.
-    pub(super) gone: AtomicBool,
     heard: Counts,
     menus: Mutex<Vec<(Option<ClapId>, i32, i32)>>,
 }
@@ -106,9 +104,7 @@ impl HostGuiImpl for Shared {
     fn request_hide(&self) -> Result<(), HostError> {
         Ok(())
     }
-    fn closed(&self, _: bool) {
-        self.gone.store(true, Ordering::Release);
-    }
+    fn closed(&self, _: bool) {}
 }
 
 impl HostParamsImplShared for Shared {

@@ -91,8 +91,11 @@ impl BridgedFeel {
         let Some(sender) = &mut self.sender else { return };
         match (feel, self.ceiling_mnm.or(session_mnm)) {
             (Some(feel), Some(ceiling_mnm)) => {
+                // Wall and slap are stiffnesses: only the knob can limit their torque.
                 let scale_mnm = feel.scale_mnm.min(f32::from(ceiling_mnm));
-                sender.poll(&Feel { scale_mnm, ..*feel }, now_us);
+                let [friction, detent] =
+                    [feel.friction, feel.detent].map(|tenths| tenths.min(ceiling_mnm.saturating_mul(10)));
+                sender.poll(&Feel { scale_mnm, friction, detent, ..*feel }, now_us);
             }
             _ => sender.rest(now_us),
         }
@@ -176,6 +179,15 @@ mod tests {
         assert_eq!(heard.len(), 1);
         assert!(heard[0].0 == 60.0 && heard[0].1 > 0.0, "the ceiling holds: {heard:?}");
         (bridge, feels)
+    }
+
+    #[test]
+    fn a_lower_ceiling_holds_for_friction_and_mark_too() {
+        let (bridge, mut feels) = armed();
+        feels.lower(1);
+        let bare = Feel { damping_mnms: 0.0, wall_mnm_per_deg: 0.0, slap_mnm_per_deg: 0.0, ..feel() };
+        feels.poll(Some(&bare), None, 1_000_000);
+        assert_eq!(bridge.heard(), [(1.0, 2.0)], "friction 1 mNm and mark 1 mNm");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::device::link::Hooks;
 use crate::device::lock::{Holder, LockError, Ownership};
 use crate::device::osc;
 use crate::device::osc::StockMessage;
-use crate::device::reader::{KnobWriter, Sample};
+use crate::device::reader::KnobWriter;
 use crate::device::runtime_dir::RuntimeDir;
 use crate::device::session::{HostSession, SessionEvent, SessionOutput, SessionStatus, StateSample};
 use crate::device::stats::{LinkStats, Meter};
@@ -84,13 +84,7 @@ impl Outlet<'_> {
     }
 
     fn state(&mut self, state: &StateSample) {
-        self.writer.push(Sample {
-            host_us: state.host_us,
-            angle_deg: state.angle_deg,
-            velocity_deg_s: state.velocity_deg_s,
-            flags: state.flags,
-            period_us: state.period_us,
-        });
+        self.writer.push(state.into());
         (self.hooks.on_state)(state);
     }
 }
