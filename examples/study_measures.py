@@ -12,6 +12,8 @@ WINDOW_S = 0.5
 SETTLE_S = 0.3
 # Fewest rows in such a window: the slowest stream, 25 Hz, has about 12.
 WINDOW_ROWS = 10
+# Fewest windows whose median one restless window does not decide.
+HELD_WINDOWS = 3
 # The overshoot is measured for this long after the onset: about the reaction time of a person.
 OVERSHOOT_S = 0.2
 # Fewest onsets whose spread means anything (judgement).
@@ -109,10 +111,10 @@ def measure_onset(found, piece, begin, speaks, end):
         found.overshoot_deg.append(float(np.max(angle[reached]) - middle(angle[held])))
 
 
-def median(values):
-    """Median of what is known, or nan."""
+def median(values, least=1):
+    """Median of what is known, or nan if fewer than `least` are."""
     known = [value for value in values if math.isfinite(value)]
-    return middle(known) if known else math.nan
+    return middle(known) if len(known) >= least else math.nan
 
 
 def integrals(piece):
@@ -164,14 +166,14 @@ def row_of(own):
     found = {name: [value for note in notes for value in getattr(note, name)] for name in LISTS}
     silent, sounded = (sum(getattr(note, name) for note in notes) for name in ("silent", "sounded"))
     onsets = found["onset_s"]
-    gamma_rms = median(found["gamma_rms"])
+    gamma_rms = median(found["gamma_rms"], HELD_WINDOWS)
     h, k = (median([getattr(piece, name) for piece in own]) for name in ("h", "k"))
     return {
         "h": h,
         "k": k,
         "time_s": time_s,
         "visits": sum(piece.is_visit for piece in own),
-        "angle_rms_deg": median(found["angle_rms_deg"]),
+        "angle_rms_deg": median(found["angle_rms_deg"], HELD_WINDOWS),
         "held_windows": len(found["angle_rms_deg"]),
         "onset_s": median(onsets),
         "onset_spread_s": float(np.std(onsets, ddof=1)) if len(onsets) >= SPREAD_ONSETS else math.nan,

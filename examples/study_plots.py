@@ -47,10 +47,10 @@ def plot_timeline(path, title, pieces):
             )
     axes[0].set_ylabel("angle, degrees")
     axes[1].set_ylabel("gamma (mouth over\nclosing pressure)")
-    axes[2].set_ylabel("torque of the motor, mNm")
+    axes[2].set_ylabel("commanded torque, mNm")
     axes[2].set_xlabel("time, s")
     handles = [plt.Line2D([], [], color=STYLE[c]["color"], label=c) for c in CONDITIONS]
-    handles += [plt.Line2D([], [], color="black", ls=":", lw=0.9, label="gamma_on of the note")]
+    handles += [plt.Line2D([], [], color="black", ls=":", lw=0.9, label="gamma at which the note begins")]
     handles += [plt.Rectangle((0, 0), 1, 1, color="0.88", label="side B")]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
     figure.suptitle(title)

@@ -353,6 +353,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     }
     let is_listed = snapshot.knob.devices.iter().any(|device| device.is_knob);
     let has_knob = snapshot.knob.is_live || is_listed || hands.step("knob") > 0;
+    widgets::say_feel(ui, has_knob || kept.is_lab);
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
@@ -362,7 +363,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
     line.frame(Frame::new().fill(c.ground).inner_margin(Margin { left: 2, right: 10, top: 0, bottom: 0 }))
         .show(ui, |ui| {
-            if header::tabs(ui, kept, has_knob, is_blind, snapshot) {
+            if header::tabs(ui, kept, has_knob, is_blind, trial.is_on(), snapshot) {
                 presets.is_open = false;
                 files.close();
             }

@@ -196,7 +196,7 @@ fn a_chart_of_peaks_follows_the_notes() {
             NotePeaks {
                 written,
                 sounding_hz: written.sounding(2).unwrap().frequency_hz(440.0),
-                mode: of.mode,
+                shown: 8,
                 peaks: model.peaks(&of.open, 0.0, 4),
             }
         })

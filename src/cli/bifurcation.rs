@@ -83,8 +83,14 @@ impl BifurcationCommand {
         bar.finish_and_clear();
 
         let note = format!(
-            "zeta {}, strength {}, lay {}, breath noise {}; gamma 0 to {} in {} s and back",
-            settings.zeta, settings.strength, settings.lay, settings.noise, self.to, self.seconds
+            "zeta {}, strength {}, lay {}, breath noise {}; gamma 0 to {} in {} s and back{}",
+            settings.zeta,
+            settings.strength,
+            settings.lay,
+            settings.noise,
+            self.to,
+            self.seconds,
+            self.settings.given_in_words()?
         );
         table.comment(format_args!("{name}; written {written}; {note}"))?;
         let changes = found.transitions();

@@ -33,10 +33,11 @@ impl Doubt {
             (Self::Reset, resets > 0),
             (
                 Self::NoTone,
-                is_long
-                    && level
-                        .after_beginning
-                        .is_some_and(|rms| rms <= (NO_TONE[0] * level.peak).min(NO_TONE[1])),
+                level.peak == 0.0
+                    || is_long
+                        && level
+                            .after_beginning
+                            .is_some_and(|rms| rms <= (NO_TONE[0] * level.peak).min(NO_TONE[1])),
             ),
         ];
         all.into_iter().filter_map(|(doubt, is_so)| is_so.then_some(doubt))
@@ -62,7 +63,7 @@ impl Doubt {
             Self::Limited => "the limiter turned peaks down; lower gain-db for levels as played",
             Self::Reset => "the calculation broke down and the instrument was reset; please report this",
             Self::NoTone => {
-                "after 0.5 s there is no tone: the breath is too weak for the note, or so strong that the reed stays shut"
+                "after 0.5 s there is no tone: the breath is too weak for the note, or so strong that the reed stays shut, or the key is silent"
             }
         }
     }
@@ -89,8 +90,9 @@ mod tests {
         assert!(has_tone(0.5, Some(gain(-45.0))), "a loud beginning, then pianissimo");
         assert!(has_tone(0.5, None), "a short file");
         assert!(!has_tone(0.0, Some(0.0)), "a silent file");
-        let silent = Levels { after_beginning: Some(0.0), ..Levels::default() };
-        assert_eq!(Doubt::all(silent, 0, false).count(), 0, "nothing is held after the beginning");
+        let short = Levels { peak: 0.1, after_beginning: Some(0.0), ..Levels::default() };
+        assert_eq!(Doubt::all(short, 0, false).count(), 0, "nothing is held after the beginning");
+        assert_eq!(Doubt::all(Levels::default(), 0, false).count(), 1, "a silent file");
     }
 
     fn gain(db: f32) -> f32 {

@@ -162,24 +162,22 @@ impl FeelArgs {
     }
 }
 
-/// What is refused, with what helps as flags. `ceiling` is the flag that allows more torque; `has_reed`, whether the command has
-/// flags of the reed.
-pub fn refused_in_flags(refused: FeelRefused, ceiling: &str, has_reed: bool) -> Failure {
+/// What is refused, with what helps as flags. `ceiling` is the flag that allows more torque.
+pub fn refused_in_flags(refused: FeelRefused, ceiling: &str) -> Failure {
     let helps = match &refused {
-        FeelRefused::Silent { .. } if has_reed => "raise --zeta or --H".to_owned(),
+        FeelRefused::Silent { .. } => "raise --zeta or --H".to_owned(),
         FeelRefused::Reference(_) => "choose another --reference".to_owned(),
         FeelRefused::Travel { .. } => "shorten --travel".to_owned(),
-        FeelRefused::Crossed { .. } if has_reed => {
-            "lower --place, raise --zeta, or take --law flow".to_owned()
-        }
-        FeelRefused::Crossed { .. } => "lower --place, or take --law flow".to_owned(),
+        FeelRefused::Crossed { .. } => "lower --place, raise --zeta, or take --law flow".to_owned(),
         FeelRefused::Ceiling { strength_mnm: 0.0, .. } => {
             format!("lower the mark (--detent), or raise {ceiling}")
         }
         FeelRefused::Ceiling { strength_mnm, .. } => {
             format!("lower --torque to {strength_mnm:.0} mNm or less, lower --contrast, or raise {ceiling}")
         }
-        FeelRefused::Stiffness { .. } => "lower --torque, or lengthen --travel".to_owned(),
+        FeelRefused::Stiffness { .. } => {
+            "lower --torque or the mark (--detent), or lengthen --travel".to_owned()
+        }
         FeelRefused::Push { .. } => {
             "lower the mark (--detent) or --torque, lengthen --travel, or take --law pressure".to_owned()
         }

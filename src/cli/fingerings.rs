@@ -31,7 +31,7 @@ Examples:
 /// hz, cents: where it sounds, and how far that is from the note;
 /// gamma_on: the mouth pressure at which it begins, over the closing pressure of the reed;
 /// mode: which peak of the impedance it plays, 1 the lowest, as in an instrument file;
-/// evenness_db: how far that resonance stands above the next lower one; below 0 the lower one may sound instead;
+/// evenness_db: how far that resonance stands above the next lower one, 6 at most; below 0 the lower one may sound instead;
 /// empty for the lowest;
 /// cost: what the ranking goes by, less is better: cents, gamma_on, evenness and awkward grips together;
 /// open: holes that are open;

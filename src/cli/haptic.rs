@@ -77,12 +77,21 @@ pub struct FeltReedArgs {
     #[arg(long, value_name = "MNM", default_value = "100", value_parser = |s: &str| within(s, 0.0, f64::from(HARD_CEILING_MNM)))]
     ceiling: f64,
     #[command(flatten)]
-    reed: ReedInAirArgs,
+    played: ReedInAirArgs,
 }
 
 /// The reed and the air that are played.
 #[derive(Args)]
 pub struct ReedInAirArgs {
+    #[command(flatten)]
+    reed: ReedArgs,
+    #[command(flatten)]
+    air: AirArg,
+}
+
+/// The reed that is played.
+#[derive(Args)]
+pub struct ReedArgs {
     /// Embouchure: flow strength of the reference reed, 0.05..0.9
     #[arg(long, value_name = "ZETA", default_value_t = ZETA_REFERENCE as f32, value_parser = |s: &str| within_f32(s, 0.05, 0.9))]
     zeta: f32,
@@ -98,15 +107,13 @@ pub struct ReedInAirArgs {
     /// Stiffness k of the dimensionless law, 0.1..2 [default: 27/(4 H^3), following H]
     #[arg(long = "k", value_name = "K", value_parser = |s: &str| within_f32(s, 0.1, 2.0))]
     k: Option<f32>,
-    #[command(flatten)]
-    air: AirArg,
 }
 
-impl ReedInAirArgs {
-    /// The bore in this air, and the reed as it is played on it.
-    pub fn bore_and_reed(&self, file: &InstrumentFile) -> Result<(RequirementSolver, PlayedReed), Failure> {
+impl ReedArgs {
+    /// The standard settings with this reed.
+    pub fn settings(&self) -> Settings {
         let standard = Settings::default();
-        let settings = Settings {
+        Settings {
             zeta: self.zeta,
             strength: self.strength.unwrap_or(standard.strength),
             lip: self.lip.unwrap_or(standard.lip),
@@ -114,17 +121,29 @@ impl ReedInAirArgs {
             reed_k: self.k.unwrap_or(standard.reed_k),
             coupled: self.k.is_none(),
             ..standard
-        };
+        }
+    }
+
+    /// In words: zeta, and H and k of its law.
+    fn in_words(&self) -> String {
+        let law = self.settings().reed_law();
+        format!("zeta {}, H {:.4}, k {:.4}", self.zeta, law.h(), law.k())
+    }
+}
+
+impl ReedInAirArgs {
+    /// The bore in this air, and the reed as it is played on it.
+    pub fn bore_and_reed(&self, file: &InstrumentFile) -> Result<(RequirementSolver, PlayedReed), Failure> {
         let bore = RequirementSolver::new(file, self.air.air(), A4_HZ)
             .map_err(|error| Failure::Usage(error.to_string()))?;
-        Ok((bore, played_reed(file, A4_HZ, &settings)))
+        Ok((bore, played_reed(file, A4_HZ, &self.reed.settings())))
     }
 }
 
 impl FeltReedArgs {
     /// The bore in this air, and the reed as it is played on it.
     pub fn bore_and_reed(&self, file: &InstrumentFile) -> Result<(RequirementSolver, PlayedReed), Failure> {
-        self.reed.bore_and_reed(file)
+        self.played.bore_and_reed(file)
     }
 
     /// The feel of every note, where the limits allow that of all of them, or of the one `note` that is asked for.
@@ -138,7 +157,7 @@ impl FeltReedArgs {
                 .and_then(|table| table.accepts(fingering, &design, &limits).map(|()| table)),
             None => FeelTable::new(&bore, &design, &reed, &limits),
         };
-        feel.map_err(|refused| refused_in_flags(refused, "--ceiling", true))
+        feel.map_err(|refused| refused_in_flags(refused, "--ceiling"))
     }
 }
 
@@ -163,9 +182,9 @@ impl HapticCommand {
             "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg",
         )?;
         table.comment(format_args!(
-            "{}; zeta {}, {} about {}",
+            "{}; {}, {} about {}",
             file.name,
-            self.felt.reed.zeta,
+            self.felt.played.reed.in_words(),
             self.felt.feel.exaggeration(),
             feel.reference().written
         ))?;
@@ -203,10 +222,11 @@ impl HapticCommand {
         let design = self.felt.feel.design(file)?;
         let one = |written| feel.notes().iter().filter(|note| note.written == written).collect();
         let notes: Vec<&NoteFeel> = self.notes.one().map_or_else(|| few(feel), one);
-        let (zeta, exaggeration) = (self.felt.reed.zeta, self.felt.feel.exaggeration());
+        let (reed, exaggeration) = (self.felt.played.reed.in_words(), self.felt.feel.exaggeration());
+        let travel = if design.equal_travel { ", equal travel" } else { "" };
         let remark = format!(
-            "{}; zeta {zeta}, {exaggeration}. A disc stands where the note speaks, a ring where a resting reed is shut.",
-            file.name
+            "{}; {reed}; {exaggeration}{travel}, {} mNm. A disc stands where the note speaks, a ring where a resting reed is shut.",
+            file.name, design.strength_mnm
         );
         plot.draw(|| {
             let notes = Ok(notes.into_iter().map(Torque::of).collect());

@@ -226,19 +226,23 @@ impl ImpedanceCommand {
         if matches!(bore, Bore::Lattice(_)) {
             let exact = Bore::Tmm(exact);
             let theirs = exact.peaks(&of.open, volume_m3, count);
-            let apart: Vec<(f64, f64)> = modes
+            let shown: Vec<&Peak> = modes.iter().filter(|mode| mode.f_hz <= self.range.last_hz()).collect();
+            let apart: Vec<(f64, f64)> = shown
                 .iter()
-                .zip(&theirs)
-                .filter(|(mode, _)| mode.f_hz <= self.range.last_hz())
-                .map(|(a, b)| {
-                    (cents(a.f_hz, b.f_hz).abs(), 20.0 * (a.mag_over_zc / b.mag_over_zc).log10().abs())
+                .filter_map(|a| {
+                    let b = partner(a, &theirs)?;
+                    Some((cents(a.f_hz, b.f_hz).abs(), 20.0 * (a.mag_over_zc / b.mag_over_zc).log10().abs()))
                 })
                 .collect();
             if !apart.is_empty() {
                 let mean =
                     |value: fn(&(f64, f64)) -> f64| apart.iter().map(value).sum::<f64>() / apart.len() as f64;
+                let alone = match shown.len() - apart.len() {
+                    0 => String::new(),
+                    alone => format!("; {alone} more in the lattice alone"),
+                };
                 notes.push(format!(
-                    "{} modes, lattice against transfer matrices: mean {:.1} cents, {:.2} dB",
+                    "{} modes, lattice against transfer matrices: mean {:.1} cents, {:.2} dB{alone}",
                     apart.len(),
                     mean(|&(cents, _)| cents),
                     mean(|&(_, db)| db)
@@ -267,9 +271,9 @@ impl ImpedanceCommand {
             .map(|of| NotePeaks {
                 written: of.written,
                 sounding_hz: sounding_hz(file, of.written),
-                mode: of.mode,
-                // The one that sounds shall be among them.
-                peaks: bore.peaks(&of.open, volume_m3, count.max(of.mode)),
+                // The one that sounds shall be among them, also where a model has more peaks below it.
+                peaks: bore.peaks(&of.open, volume_m3, count.max(of.mode + MORE)),
+                shown: count,
             })
             .collect();
         let about = format!(
@@ -295,6 +299,19 @@ impl ImpedanceCommand {
         }
         Ok(Bore::Lattice(self.instrument.bore(file, 48_000, self.quality())?))
     }
+}
+
+/// Peaks that a model may have below the one that sounds, beyond those that the instrument's file counts.
+const MORE: usize = 3;
+
+/// Peaks of two models that are farther apart are not the same one, cents: a hump that is double in one model is single in the other.
+const PARTNERS_CENTS: f64 = 50.0;
+
+/// The peak of another model that is this one.
+fn partner<'a>(peak: &Peak, theirs: &'a [Peak]) -> Option<&'a Peak> {
+    let apart = |other: &&Peak| cents(peak.f_hz, other.f_hz).abs();
+    let nearest = theirs.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    (apart(&nearest) <= PARTNERS_CENTS).then_some(nearest)
 }
 
 enum Bore {

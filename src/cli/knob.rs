@@ -2,9 +2,11 @@
 
 use crate::cli::feel_args::{FeelArgs, refused_in_flags};
 use crate::cli::files;
+use crate::cli::haptic::ReedArgs;
 use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::cli::{Failure, INTERRUPTED};
 use crate::feel_flags;
+use crate::identity::VERSION;
 use crate::output::{NewFile, OutputError, remove_unfinished_and_exit};
 use crate::take_file::TakeFile;
 use chalumeau_core::control::knob::KnobDesign;
@@ -17,6 +19,7 @@ use chalumeau_knob::device::{
 };
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::{TakeHand, TakeMarks, TakeRow};
+use chalumeau_knob::touch::take_csv::instrument_remark;
 use clap::{ArgGroup, Args};
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
@@ -83,7 +86,7 @@ pub struct KnobCommand {
     /// First make the present position zero; it arms once the knob has shown an angle near zero
     #[arg(long)]
     zero: bool,
-    /// End after this time, s
+    /// End this long after the knob has answered, s; one that does not answer ends the command after 10 s
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.1, 86_400.0))]
     seconds: Option<f64>,
     /// Write the take to this CSV file when done
@@ -96,11 +99,14 @@ pub struct KnobCommand {
     instrument: InstrumentArg,
     #[command(flatten)]
     feel: FeelArgs,
+    #[command(flatten)]
+    reed: ReedArgs,
 }
 
 /// The feel that was asked for.
 struct WantedFeel {
     feels: InstrumentFeel,
+    settings: Settings,
     design: FeelDesign,
     fingering: usize,
     may_weaken: bool,
@@ -114,22 +120,26 @@ struct Settled {
 }
 
 impl WantedFeel {
-    /// The feel of the note, and its design, weakened as far as the limits ask for and the user allows.
+    /// The feel of the note, and its design, weakened as far as the limits ask for and the user allows: as far as the hardest note
+    /// of the chart needs, so that the notes of several commands can be compared.
     fn under(&self, limits: &TorqueLimits) -> Result<(NoteFeel, FeelDesign), Failure> {
         let mut design = self.design;
         loop {
-            let table = self.feels.table(&Settings::default(), &design, &NO_MOTOR)?;
-            match table.accepts(self.fingering, &design, limits) {
-                Ok(()) => {
+            let table = self.feels.table(&self.settings, &design, &NO_MOTOR)?;
+            let is_too_strong = |refused: &FeelRefused| matches!(refused, FeelRefused::Ceiling { .. });
+            let hardest = self.feels.table(&self.settings, &design, limits).err();
+            let own = table.accepts(self.fingering, &design, limits).err();
+            match hardest.filter(is_too_strong).filter(|_| self.may_weaken).or(own) {
+                None => {
                     let note = table.note(self.fingering).copied().unwrap_or(*table.reference());
                     return Ok((note, design));
                 }
-                Err(FeelRefused::Ceiling { strength_mnm, .. })
+                Some(FeelRefused::Ceiling { strength_mnm, .. })
                     if self.may_weaken && strength_mnm < design.strength_mnm && strength_mnm > 0.0 =>
                 {
                     design.strength_mnm = strength_mnm;
                 }
-                Err(refused) => return Err(refused_in_flags(refused, "--arm", false)),
+                Some(refused) => return Err(refused_in_flags(refused, "--arm")),
             }
         }
     }
@@ -142,16 +152,16 @@ impl KnobCommand {
         let written = WrittenNote(self.written);
         check_fingering(&file, written)?;
         let feels = InstrumentFeel::new(&*self.instrument.tuned(&Wanted::new(file.clone(), 48_000.0))?);
-        // The knob gets this note only, so the hardest note does not matter.
         let fingering = feels.requirements().written().position(|note| note == written).unwrap_or(0);
         let design = self.feel.design(&file)?;
-        let wanted = WantedFeel { feels, design, fingering, may_weaken: self.feel.may_weaken() };
+        let settings = self.reed.settings();
+        let wanted = WantedFeel { feels, settings, design, fingering, may_weaken: self.feel.may_weaken() };
         let ceiling_mnm = self.arm.unwrap_or(f64::from(FIRST_CEILING_MNM));
         // What is refused on any knob is refused before one is looked for.
         let (note, _) = wanted.under(&TorqueLimits { ceiling_mnm, ..TorqueLimits::default() })?;
         self.ask_again()?;
         let take = self.record.as_ref().map(|path| NewFile::create(path, self.force)).transpose()?;
-        let fingered = format!("{written} (written {}) of {}", written.0, file.name);
+        let fingered = format!("{written} (written {})", written.0);
 
         let (rows, heard) = channel();
         // None until the knob has told its limits.
@@ -169,9 +179,31 @@ impl KnobCommand {
             let remarks = |design: &FeelDesign| {
                 let usual = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
                 let hand = TakeHand { design: usual, feels: true };
-                let freely = self.arm.is_none().then(|| "not armed: the knob turned freely".to_owned());
-                let always = [fingered.clone(), feel_flags::remark(design), hand.remark()];
-                always.into_iter().chain(freely).collect()
+                let knob = status.info.map_or_else(
+                    || "a knob that does not say what torque it makes".to_owned(),
+                    |info| {
+                        let (major, minor, patch) = info.firmware;
+                        let serial = serial_text(info.serial);
+                        let freely = match self.arm {
+                            Some(mnm) => format!("armed with at most {mnm} mNm"),
+                            None => "never armed: it turned freely".to_owned(),
+                        };
+                        format!(
+                            "{}, serial number {serial}, firmware {major}.{minor}.{patch}, {freely}",
+                            info.name_text()
+                        )
+                    },
+                );
+                vec![
+                    format!(
+                        "Chalumeau {VERSION} take; t_us counts from the start of the link, angle from the knob's zero"
+                    ),
+                    fingered.clone(),
+                    instrument_remark(&file.name),
+                    feel_flags::remark(design),
+                    hand.remark(),
+                    knob,
+                ]
             };
             let as_asked = || Settled { note, remarks: remarks(&wanted.design) };
             let Some(info) = &status.info else { return Ok(as_asked()) };
@@ -181,11 +213,11 @@ impl KnobCommand {
                 Err(_) if self.arm.is_none() => return Ok(as_asked()),
                 settled => settled?,
             };
-            let mut remarks: Vec<_> = remarks(&design);
+            let mut remarks = remarks(&design);
             let (asked_mnm, strength_mnm) = (wanted.design.strength_mnm, design.strength_mnm);
             if strength_mnm < asked_mnm && self.arm.is_some() {
                 let weakened = format!(
-                    "the feel is weakened from {asked_mnm:.0} to {strength_mnm:.0} mNm to stay below {:.0} mNm, which --arm and this knob allow",
+                    "the feel is weakened from {asked_mnm:.0} to {strength_mnm:.0} mNm: then no note needs more than {:.0} mNm, which --arm and this knob allow",
                     limits.ceiling_mnm
                 );
                 say!("{weakened}");
@@ -252,7 +284,7 @@ impl KnobCommand {
         settle: &dyn Fn(&LinkStatus) -> Result<Settled, Failure>,
         mut file: Option<NewFile>,
     ) -> Result<(), Failure> {
-        let closing_pa = Settings::default().closing_pa();
+        let closing_pa = self.reed.settings().closing_pa();
         let began = Instant::now();
         let mut live_since = None;
         let mut enter: Option<Arc<AtomicBool>> = None;
@@ -263,6 +295,8 @@ impl KnobCommand {
         let mut was_armed = false;
         // Begins with the remarks on the feel, which the knob's limits decide.
         let mut take = None;
+        // Positions from before the zero would be a breath that nobody blew.
+        let mut is_zeroed = !self.zero;
         // This thread obeys the user: what it prints is what the user sees. When it waits for its terminal, it beats no more.
         let heart = link.heartbeat("this program");
         let [stop, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
@@ -332,7 +366,13 @@ impl KnobCommand {
                 };
                 return Err(Failure::Usage(format!("no knob after {} s: {why}", PATIENCE.as_secs())));
             }
-            for state in heard.try_iter() {
+            let is_at_zero =
+                || status.zeros > 0 || status.tier == 0 && status.angle_deg.is_some_and(is_near_zero);
+            if !is_zeroed && live_since.is_some() && is_at_zero() {
+                is_zeroed = true;
+                heard.try_iter().for_each(drop);
+            }
+            for state in heard.try_iter().filter(|_| is_zeroed) {
                 let gamma = note.map.pressure_pa(f64::from(state.angle_deg)) / closing_pa;
                 if let (Some(take), true) = (&mut take, live_since.is_some()) {
                     write(take, &state, &note, gamma)?;
@@ -361,17 +401,22 @@ impl KnobCommand {
             1e-3 * f64::from(stats.jitter_p50_us),
             1e-3 * f64::from(stats.jitter_p99_us),
         );
-        if self.arm.is_some() && !was_armed {
-            say!("warning: the knob was never armed, so it made no torque");
-        }
         if let Some(take) = take {
             take.keep()?;
         }
         if is_lost {
             return Err(Failure::KnobLost { seconds: lost_s, text: link.status().text });
         }
+        if self.arm.is_some() && !was_armed {
+            return Err(Failure::Usage("the knob was never armed, so it made no torque".to_owned()));
+        }
         Ok(())
     }
+}
+
+/// How near to its zero a knob is that has just been told to be there, degrees.
+fn is_near_zero(angle_deg: f32) -> bool {
+    angle_deg.abs() < 2.0
 }
 
 /// Why the user is asked before the knob is armed.
@@ -420,7 +465,7 @@ fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) 
         t_us: u64::try_from(state.host_us).unwrap_or(0),
         angle_deg: f64::from(state.angle_deg),
         velocity_deg_s: f64::from(state.velocity_deg_s),
-        torque_mnm: f64::from(state.torque_mnm),
+        torque_mnm: state.torque_mnm.map(f64::from),
         written: Some(note.written.0),
         gamma,
         feel_id: state.feel_id,

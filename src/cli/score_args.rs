@@ -21,7 +21,7 @@ use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::control::parts::Unplayed;
-use chalumeau_core::event::{Event, PartEvent, Timed};
+use chalumeau_core::event::{Event, PartEvent, Timed, To};
 use chalumeau_core::haptics::{FeelDesign, RequirementSolver};
 use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::instrument::key_pitches::{KeyPitches, TRIM_MOST_CENTS};
@@ -142,6 +142,28 @@ fn trim(text: &str) -> Result<(u8, f64), String> {
     Ok((note(name)?, within(cents, -TRIM_MOST_CENTS, TRIM_MOST_CENTS)?))
 }
 
+/// Reeds whose H and k differ by less are the same: takes have five decimals.
+const SAME_REED: f64 = 2e-5;
+
+/// Most players who hold keys at the same time, where the same instant is none.
+fn at_once(score: &Score<PartEvent>) -> usize {
+    let (mut held, mut most, mut now) = (BTreeMap::<usize, usize>::new(), 0, 0);
+    for timed in &score.events {
+        if timed.at > now {
+            most = most.max(held.values().filter(|&&keys| keys > 0).count());
+            now = timed.at;
+        }
+        let To::Player(player) = timed.event.to else { continue };
+        let keys = held.entry(usize::from(player)).or_default();
+        match timed.event.event {
+            Event::NoteOn { .. } => *keys += 1,
+            Event::NoteOff { .. } | Event::Choke { .. } => *keys = keys.saturating_sub(1),
+            _ => {}
+        }
+    }
+    most
+}
+
 /// Finds a preset.
 pub(super) fn preset_called(name: &str) -> Result<Preset, String> {
     presets::find(name, &presets::user()).cloned()
@@ -206,7 +228,8 @@ impl ScoreArgs {
         let take = self.breath.take()?;
         let breath_s = curve.as_ref().and_then(BreathCurve::ends_s).unwrap_or(0.0);
         let note_s = take.as_ref().map_or(breath_s.max(USUAL_NOTE_S), Take::seconds);
-        let (mut parts, unplayed) = self.score(&file, &map, keys.as_ref(), &mut settings, note_s)?;
+        let (mut parts, unplayed) =
+            self.score(&file, &map, keys.as_ref(), &mut settings, note_s, &mut warnings)?;
         warnings.extend(self.breath_left_over(breath_s, &parts));
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);
@@ -253,10 +276,28 @@ impl ScoreArgs {
                 ));
             }
             let design = self.feel(&model.file)?;
-            let recorded = self.breath.recorded_feel();
-            if let Some(flags) = recorded.filter(|flags| !feel_flags::map_alike(flags, &design)) {
-                warnings.push(format!(
+            match self.breath.recorded_feel() {
+                Some(flags) if !feel_flags::map_alike(&flags, &design) => warnings.push(format!(
                     "the take was recorded with {flags}; the feel that you give turns its angles into other pressures"
+                )),
+                None if self.feel.given().is_none() => warnings.push(format!(
+                    "the take does not say its feel; it is replayed with {}",
+                    feel_flags::in_flags(&design)
+                )),
+                _ => {}
+            }
+            if let Some(name) = take.instrument().filter(|name| *name != model.file.name) {
+                warnings.push(format!("the take was played on another instrument: {name}"));
+            }
+            let law = settings.reed_law();
+            if let Some(((h, k), is_one)) = take.reed()
+                && ((h - law.h()).abs().max((k - law.k()).abs()) > SAME_REED || !is_one)
+            {
+                let more = if is_one { "" } else { " at first, and with others" };
+                warnings.push(format!(
+                    "the take was played with H {h}, k {k}{more}; it is replayed with H {:.5}, k {:.5}",
+                    law.h(),
+                    law.k()
                 ));
             }
             parts.events = self.replayed(take, &model, &settings, &parts)?;
@@ -337,7 +378,7 @@ impl ScoreArgs {
         let others = late.count();
         let others = if others > 0 { format!(" (and {others} more)") } else { String::new() };
         Some(format!(
-            "{note}{others} begins to sound at gamma {gamma:.2}, and the breath reaches {}: only air is heard",
+            "{note}{others} begins to sound at gamma {gamma:.2}, and the breath reaches {}: only the tongue and air are heard",
             curve.gamma_max()
         ))
     }
@@ -419,6 +460,7 @@ impl ScoreArgs {
         keys: Option<&KeyPitches>,
         settings: &mut Settings,
         note_s: f64,
+        warnings: &mut Vec<String>,
     ) -> Result<(Score<PartEvent>, Unplayed), Failure> {
         let links = as_links(&map.links, settings);
         let transposition = file.transposition;
@@ -467,6 +509,13 @@ impl ScoreArgs {
                         .map_err(refused)?;
                 *players = Players { count: count as i32, split: Split::Chords, ..*players };
                 return Ok((score, unplayed));
+            }
+            let lines = (players.parts() == 1 && !self.mpe)
+                .then(|| midi_file::read_tracks(&decoder, (key_switches, playing), &bytes, self.rate).ok());
+            if let Some(at_once) = lines.flatten().map(|tracks| at_once(&tracks.score)).filter(|&n| n > 1) {
+                warnings.push(format!(
+                    "{at_once} tracks or channels of the file play at once, and one player plays them all: add --tracks for a player each"
+                ));
             }
             let mut parts = Parts::of(decoder, players.parts());
             parts.set_key_switches(key_switches);

@@ -240,6 +240,15 @@ impl SettingsArgs {
         Ok(self.given()?.into_iter().map(|given| (given.parameter.id, given.typed)).collect())
     }
 
+    /// What was given, for the remarks of a table; nothing if nothing was.
+    pub fn given_in_words(&self) -> Result<String, Failure> {
+        let given = self.given()?;
+        let words =
+            given.iter().map(|given| format!("{} {}", given.typed, given.parameter.text(given.value)));
+        let words = words.collect::<Vec<_>>().join(", ");
+        Ok(if words.is_empty() { words } else { format!("; given {words}") })
+    }
+
     fn has(&self, id: &str) -> bool {
         self.numbers.0.iter().chain(&self.set).any(|given| given.parameter.id == id)
     }

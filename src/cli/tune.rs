@@ -108,8 +108,9 @@ impl TuneCommand {
             self.table.open_beside(&plot, "written_midi,f_hz,cents,register_ok,as_built_cents")?;
         let tuning = if self.instrument.is_as_built() { "as built" } else { name_of(settings.tuning) };
         table.comment(format_args!(
-            "{name}, {tuning}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
-            settings.a4_hz
+            "{name}, {tuning}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on{}",
+            settings.a4_hz,
+            self.settings.given_in_words()?
         ))?;
         let built = self.instrument.as_built(&file, rate)?;
         let as_built = measure_all(&notes, &built, &curve, &settings, rate);

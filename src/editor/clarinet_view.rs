@@ -19,7 +19,7 @@ use crate::editor::Action;
 use crate::editor::alteration_editor::{AlterationEditor, Altered};
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, part_names, ruler, standing};
-use crate::editor::hole_names::{hole_title, hole_words};
+use crate::editor::hole_names::{fingers_title, hole_title, hole_words};
 use crate::editor::multiphonic_choices;
 use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
@@ -30,8 +30,14 @@ use chalumeau_core::bore::alternate_fingerings::{self, FingeringChoice};
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 use fingering_panel::{Chosen, FingeringPanel};
 
-/// Least distance of two buttons with their names below, points.
+/// Least distance of two buttons with their names below, points; of half of it where the names of every second stand lower.
 const NAMED: f32 = 38.0;
+/// Height of a line of these names, points.
+const NAME_LINE: f32 = 13.0;
+/// Least height of the picture in which two rows of names leave the clarinet its room, points.
+const ROOM_FOR_TWO: f32 = 220.0;
+/// Height of a name, points.
+const NAME_ROW: f32 = 2.0 * NAME_LINE;
 
 /// Name of a fingering that is not in the chart.
 const OWN: &str = "your own fingering";
@@ -115,15 +121,16 @@ impl ClarinetView {
         part_names(&painter, c, &body, wave.bottom() + 1.0);
         body.paint(&painter, c, &snapshot.standing);
         self.joints(ui, &body, snapshot, actions);
-        let buttons = hole_buttons(area, file.holes.len());
+        let rows = name_rows(area.width() / file.holes.len().max(1) as f32, area.height());
+        let buttons = hole_buttons(area, file.holes.len(), 4.0 + rows as f32 * NAME_ROW);
         for (hole, tone_hole) in file.holes.iter().enumerate() {
             let opening = match trial.open() {
                 Some(tried) => f32::from(tried.get(hole).copied().unwrap_or(false)),
                 None => chart::share(snapshot.openings.get(hole).copied().unwrap_or(0.0)),
             };
             let at = body.hole(tone_hole);
-            let is_named = area.width() >= NAMED * file.holes.len() as f32;
-            let response = button(ui, buttons[hole], tone_hole, opening, is_named);
+            let names_below = (rows > 0).then(|| (hole % rows) as f32 * NAME_ROW);
+            let response = button(ui, buttons[hole], tone_hole, opening, names_below);
             let on_bore = ui.interact(
                 at.rect.expand2(vec2(2.0, 6.0)),
                 response.id.with("bore"),
@@ -212,8 +219,7 @@ impl ClarinetView {
                     multiphonic_choices::about(choice, names, snapshot.instrument.transposition)
                 }
                 Some(choice) => {
-                    let fingers =
-                        if choice.fingers.trim().is_empty() { "no finger" } else { &choice.fingers };
+                    let fingers = fingers_title(&choice.fingers);
                     let of_note = all.iter().filter(|other| other.written == choice.written).count();
                     let more = match (of_note, choice.nth) {
                         (1, _) => String::new(),
@@ -255,7 +261,7 @@ impl ClarinetView {
                         let told = if register == multiphonic_choices::REGISTER {
                             multiphonic_choices::about(choice, names, snapshot.instrument.transposition)
                         } else {
-                            format!("{name}{alternate}: {}", choice.fingers)
+                            format!("{name}{alternate}: {}", fingers_title(&choice.fingers))
                         };
                         if response.on_hover_text(told).clicked() {
                             trial.set(choice.open.clone(), actions);
@@ -339,11 +345,21 @@ fn wave_rect(area: Rect, body: &ClarinetDrawing<'_>) -> Rect {
     Rect::from_min_max(area.left_top() + vec2(0.0, 14.0), pos2(area.right(), body.top() - 14.0))
 }
 
-/// Places of the buttons along the lower edge, in the order of the file.
-fn hole_buttons(area: Rect, holes: usize) -> Vec<Rect> {
+/// Rows of names below buttons at this distance, in a picture of this height.
+fn name_rows(width: f32, height: f32) -> usize {
+    if width >= NAMED {
+        1
+    } else if 2.0 * width >= NAMED && height >= ROOM_FOR_TWO {
+        2
+    } else {
+        0
+    }
+}
+
+/// Places of the buttons along the lower edge, over `room` for their names, in the order of the file.
+fn hole_buttons(area: Rect, holes: usize, room: f32) -> Vec<Rect> {
     let width = area.width() / holes.max(1) as f32;
     let size = width.min(24.0) - 3.0;
-    let room = if width >= NAMED { 30.0 } else { 2.0 };
     (0..holes)
         .map(|hole| {
             let x = area.left() + (hole as f32 + 0.5) * width;
@@ -353,7 +369,7 @@ fn hole_buttons(area: Rect, holes: usize) -> Vec<Rect> {
 }
 
 /// A hole as fingering charts draw it: filled means covered.
-fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, is_named: bool) -> Response {
+fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, names_below: Option<f32>) -> Response {
     let c = Colours::here(ui);
     let response = ui.interact(rect, ui.scope_id().with(("hole", &hole.name)), Sense::click());
     let painter = ui.painter();
@@ -380,11 +396,14 @@ fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, is_named: bool
     if response.has_focus() {
         painter.circle_stroke(rect.center(), radius + 3.0, Stroke::new(1.5, c.accent));
     }
-    if is_named {
-        let mut below = rect.center_bottom() + vec2(0.0, 2.0);
-        for word in hole_words(&hole.name) {
-            painter.text(below, Align2::CENTER_TOP, word, theme::small(), c.quiet);
-            below.y += 13.0;
+    if let Some(distance) = names_below {
+        let mut below = rect.center_bottom() + vec2(0.0, 2.0 + distance);
+        let words = hole_words(&hole.name);
+        // On two lines: "Low C#", "pad".
+        let (first, last) = words.split_at(words.len().div_ceil(2));
+        for line in [first, last] {
+            painter.text(below, Align2::CENTER_TOP, line.join(" "), theme::small(), c.quiet);
+            below.y += NAME_LINE;
         }
     }
     let title = hole_title(&hole.name);

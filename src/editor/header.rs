@@ -162,7 +162,10 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
     let transposition = snapshot.instrument.transposition;
     // The fingering in place before the first note is nobody's note.
     let has_played = ui.data_mut(|data| {
-        let has_played = data.get_temp_mut_or_default::<bool>(response.id);
+        let (of, has_played) = data.get_temp_mut_or_default::<(String, bool)>(response.id);
+        if *of != snapshot.instrument_key {
+            (*of, *has_played) = (snapshot.instrument_key.clone(), false);
+        }
         *has_played |= snapshot.sounding.is_some();
         *has_played
     });
@@ -195,6 +198,7 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
         false => format!("{}, no note yet", kept.names.title()),
     };
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &said));
+    focus_ring(ui, &response);
     if response.clicked() {
         kept.names = kept.names.other();
     }
@@ -342,6 +346,7 @@ pub fn tabs(
     kept: &mut WindowState,
     has_knob: bool,
     is_blind: bool,
+    is_trying: bool,
     snapshot: &Snapshot,
 ) -> bool {
     let mut is_clicked = false;
@@ -364,7 +369,11 @@ pub fn tabs(
             ui.add_space(8.0);
             lamps::draw(ui, snapshot, is_wide, is_blind);
             ui.add_space(8.0);
-            status(ui, snapshot);
+            let trying =
+                Status { level: Severity::Note, text: "trying a fingering: its holes sound".to_owned() };
+            let (first, others): (Vec<_>, Vec<_>) =
+                snapshot.status.iter().cloned().partition(|status| status.level == Severity::Warn);
+            status(ui, first.into_iter().chain(is_trying.then_some(trying)).chain(others).collect());
         });
     });
     is_clicked
@@ -415,14 +424,15 @@ fn laboratory(ui: &mut Ui, kept: &mut WindowState, has_knob: bool) {
     }
 }
 
-fn status(ui: &mut Ui, snapshot: &Snapshot) {
+/// The first of these; all in its tip.
+fn status(ui: &mut Ui, all: Vec<Status>) {
     let c = Colours::here(ui);
     let colour = |level| match level {
         Severity::Good => c.speaks,
         Severity::Note => c.breath,
         Severity::Warn => c.danger,
     };
-    let Some(Status { level, text }) = snapshot.status.first().cloned() else { return };
+    let Some(Status { level, text }) = all.first().cloned() else { return };
     let width = ui.available_width() - 20.0;
     let label = egui::Label::new(egui::RichText::new(&text).font(theme::small()).color(c.quiet)).truncate();
     // Its own tip below has all lines.
@@ -433,7 +443,7 @@ fn status(ui: &mut Ui, snapshot: &Snapshot) {
     ui.painter().circle_filled(dot.center(), 3.5, colour(level));
     response.on_hover_ui(|ui| {
         ui.label(&text);
-        for status in snapshot.status.iter().filter(|status| status.text != text) {
+        for status in all.iter().filter(|status| status.text != text) {
             ui.label(egui::RichText::new(&status.text).color(colour(status.level)));
         }
     });

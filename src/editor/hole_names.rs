@@ -10,6 +10,14 @@ pub fn hole_title(name: &str) -> String {
     hole_words(name).join(" ")
 }
 
+/// What the fingers of a fingering press, as a reader says it. Instrument files write `low Ckey`, and nothing where no finger does.
+pub fn fingers_title(fingers: &str) -> String {
+    if fingers.trim().is_empty() {
+        return "no finger".to_owned();
+    }
+    fingers.replace("key", " key").replace("sliver", "sliver ").replace("side", "side ")
+}
+
 /// Whether the thumb covers this hole, which is at the back. Instrument files write `THUMB`.
 pub fn is_thumb(name: &str) -> bool {
     name.eq_ignore_ascii_case("thumb")
@@ -33,6 +41,12 @@ fn word_of(word: &str, is_first: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_are_words_of_their_own() {
+        assert_eq!(fingers_title("R T L1 sliverB Ebkey"), "R T L1 sliver B Eb key");
+        assert_eq!(fingers_title(" "), "no finger");
+    }
 
     #[test]
     fn sharps_and_flats_have_their_signs() {

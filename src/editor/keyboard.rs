@@ -322,11 +322,15 @@ impl Keys {
             let place = pos2(key.center().x - 0.5 * words.size().x, key.bottom() - low - words.size().y);
             painter.galley(place, words, ink);
         }
-        // A C has the name that every keyboard gives it; a key that is held has the name of the note it plays.
+        // A C has the name that every keyboard gives it; a key that is held has the name of the note it plays. While one is held whose
+        // name is not its own, the others have none: two keys would be C4.
+        let is_renamed = |note: u8| is_down(note) && named(note).is_some_and(|name| name != note);
+        let holds_renamed = (self.from..=self.to).any(is_renamed);
         for note in self.from..=self.to {
             let (key, is_down) = (self.key(note), is_down(note));
             let name = match is_down {
                 true => named(note),
+                false if holds_renamed => None,
                 false if is_low && letter(note).is_some() => None,
                 false => (note % 12 == 0).then_some(note),
             };

@@ -40,8 +40,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, is_wide: bool, is_blind: bool) {
     let about = format!("Lit while the player blows. Breath comes from: {source}");
     let word = |word| if is_wide { word } else { "" };
     lamp(ui, LAMP[narrow], word("Breath"), blows.then_some(c.breath), ["Breath blows", "No breath"], &about);
-    let about =
-        "Lit while notes or controllers arrive from the host or a MIDI input. Keys of this window are none.";
+    let about = "Lit while notes or controllers arrive from the host or a MIDI input. The keys of this window do not light it.";
     let inputs = snapshot.connections.as_ref().map(|now| format!(" MIDI inputs: {}.", now.midi_line()));
     let about = format!("{about}{}", inputs.unwrap_or_default());
     lamp(

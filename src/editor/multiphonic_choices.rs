@@ -1,5 +1,6 @@
 //! The multiphonics that were found on the built-in clarinet, as choices of the picker.
 
+use crate::editor::hole_names::fingers_title;
 use crate::editor::note_names::{NoteNames, note_name};
 use chalumeau_core::bore::alternate_fingerings::FingeringChoice;
 use chalumeau_core::bore::bundled::Bundled;
@@ -36,7 +37,7 @@ pub fn about(choice: &FingeringChoice, names: NoteNames, transposition: i8) -> S
     format!(
         "M{}: {}. Tones at {} Hz. Found with the key {key} held, at a breath of {:.0} % where the breath response is Physical.",
         choice.nth + 1,
-        one.fingers,
+        fingers_title(&one.fingers),
         tones.join(", "),
         100.0 * one.breath
     )

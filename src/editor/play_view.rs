@@ -111,7 +111,8 @@ impl PlayView {
                     rect.min + vec2(190.0 * grown, 2.0),
                     pos2(title.left() - 16.0, rect.top() + 2.0 + alteration_editor::ROW),
                 );
-                let layout = egui::Layout::right_to_left(egui::Align::Center);
+                // From the left: the name, which is longer while holes are moved, moves no button under the pointer.
+                let layout = egui::Layout::left_to_right(egui::Align::Center);
                 ui.scope_builder(egui::UiBuilder::new().max_rect(place).layout(layout), |ui| {
                     alterations.save_and_put_back(ui, snapshot, actions);
                 });

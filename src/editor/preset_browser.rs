@@ -136,9 +136,12 @@ impl PresetBrowser {
         let shown: Vec<&Preset> = shelf.all().filter(|preset| self.is_shown(preset, shelf)).collect();
         if shown.is_empty() {
             let c = Colours::here(ui);
-            ui.label(
-                RichText::new("No preset is like that. Take a tag off, or search for less.").color(c.quiet),
-            );
+            let text = if self.favourites && !shelf.all().any(|preset| shelf.is_liked(&preset.name)) {
+                "No favourites yet: the star beside the name of a preset makes it one."
+            } else {
+                "No preset is like that. Take a tag off, or search for less."
+            };
+            ui.label(RichText::new(text).color(c.quiet));
             return;
         }
         ui.spacing_mut().item_spacing.y = 0.0;

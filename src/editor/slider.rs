@@ -77,6 +77,7 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
                 pos2(rect.right() - 96.0, rect.top() - 1.0),
                 pos2(rect.right(), rect.top() + 21.0),
             ),
+            Align2::RIGHT_CENTER,
         );
     } else {
         let ink = if value_response.hovered() { c.accent } else { c.ink };
@@ -183,21 +184,28 @@ fn paint_slider(
 }
 
 /// The text field over a value. Enter takes it, Escape leaves it, and so does a click elsewhere.
-pub fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
+pub fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect, align: Align2) {
     let Some(mut entry) = hands.entry.take() else { return };
     let c = Colours::here(ui);
     let field = TextEdit::singleline(&mut entry.text)
         .id(egui::Id::unique(("value of", id)))
         .font(theme::body())
         .text_color(if entry.is_wrong { c.danger } else { c.ink })
-        .align(egui::Align2::RIGHT_CENTER)
+        .align(align)
         .desired_width(rect.width());
+    ui.painter().rect(
+        rect.expand(1.0),
+        CornerRadius::same(theme::SMALL_RADIUS),
+        c.ground,
+        Stroke::new(1.0, c.accent),
+        egui::StrokeKind::Outside,
+    );
     // In a place of its own: `put` here would move what follows.
     let response = ui.new_child(egui::UiBuilder::new().max_rect(rect)).put(rect, field);
     let name = hands.name(id);
     response.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, format!("{name}, value")));
     if entry.is_wrong {
-        say_range(ui, id, rect);
+        say_range(ui, id, rect, align);
     }
     if !entry.is_shown {
         entry.is_shown = true;
@@ -228,15 +236,17 @@ fn typed(hands: &Hands, id: &str, text: &str) -> Option<f32> {
 }
 
 /// Says below a field what it takes.
-fn say_range(ui: &mut Ui, id: &str, field: Rect) {
+fn say_range(ui: &mut Ui, id: &str, field: Rect, align: Align2) {
     let Some(parameter) = terms::of(id) else { return };
     let c = Colours::here(ui);
     let said = egui::RichText::new(parameter.range()).font(theme::small()).color(c.danger);
     let galley = ui.painter().layout_no_wrap(parameter.range(), theme::small(), c.danger);
-    let size = galley.size() + vec2(6.0, 0.0);
-    let place = Rect::from_min_size(pos2(field.right() - size.x, field.bottom() + 1.0), size);
-    // Over the slider's track, which is at rest meanwhile.
-    ui.painter().rect_filled(place, CornerRadius::same(2), c.panel);
+    let size = galley.size() + vec2(10.0, 4.0);
+    let left =
+        if align == Align2::CENTER_CENTER { field.center().x - 0.5 * size.x } else { field.right() - size.x };
+    let place = Rect::from_min_size(pos2(left, field.bottom() + 2.0), size);
+    // Over the slider's track or the words below, which are at rest meanwhile.
+    ui.painter().rect_filled(place, CornerRadius::same(2), c.raised);
     let inside = egui::UiBuilder::new().max_rect(place);
     ui.new_child(inside).put(place, egui::Label::new(said).extend());
 }

@@ -37,14 +37,8 @@ impl SoundAnalysis {
     /// Of the end of `samples`; missing samples at the front and those that are no numbers count as silence. `wanted_hz` is
     /// the pitch of the fingered note. Allocates.
     pub fn of(samples: &[f32], rate_hz: f64, wanted_hz: Option<f64>) -> Self {
-        let latest = &samples[samples.len().saturating_sub(WINDOW)..];
-        let mut heard = vec![0.0; WINDOW - latest.len()];
-        heard.extend(latest.iter().map(|&sample| if sample.is_finite() { f64::from(sample) } else { 0.0 }));
-        let spectrum = spectrum::hann_spectrum_db(&heard, rate_hz);
-        let count = (HIGHEST_HZ / spectrum.bin_hz) as usize;
-        let level_db = spectrum.level_db.iter().take(count).map(|&db| (db as f32).max(FLOOR_DB)).collect();
-        let bin_hz = spectrum.bin_hz as f32;
-        let steady = &heard[WINDOW - latest.len()..];
+        let (heard, length, blank) = Self::spectrum_of(samples, rate_hz);
+        let steady = &heard[WINDOW - length..];
         let f0_hz = match wanted_hz {
             Some(wanted_hz) => pitch::fundamental_near_hz(steady, rate_hz, wanted_hz),
             None => pitch::fundamental_hz(steady, rate_hz),
@@ -54,17 +48,35 @@ impl SoundAnalysis {
             let off = wanted_hz.map_or(0.0, |wanted_hz| cents(*f0_hz, wanted_hz).abs());
             off > pitch::OTHER_CENTS && spectrum::rms_dbfs(steady) < AIR_DBFS
         };
-        let Some(f0_hz) = f0_hz.filter(|f0_hz| !is_air(f0_hz)) else {
-            return Self { bin_hz, level_db, ..Self::default() };
-        };
+        let Some(f0_hz) = f0_hz.filter(|f0_hz| !is_air(f0_hz)) else { return blank };
         let harmonics = spectrum::harmonic_levels_db(steady, rate_hz, f0_hz);
         Self {
-            bin_hz,
-            level_db,
             harmonics_db: harmonics.into_iter().map(|db| db as f32).collect(),
             f0_hz: Some(f0_hz as f32),
             cents: wanted_hz.map(|wanted_hz| cents(f0_hz, wanted_hz) as f32),
+            ..blank
         }
+    }
+
+    /// The same where others sound on other notes: its pitch is looked for near `wanted_hz` alone, and its harmonics lie among those
+    /// of the others. Allocates.
+    pub fn of_chord(samples: &[f32], rate_hz: f64, wanted_hz: f64) -> Self {
+        let (heard, length, blank) = Self::spectrum_of(samples, rate_hz);
+        let f0_hz = pitch::refine_hz(&heard[WINDOW - length..], rate_hz, wanted_hz);
+        let off = f0_hz.map(|f0_hz| cents(f0_hz, wanted_hz) as f32);
+        Self { f0_hz: f0_hz.map(|f0_hz| f0_hz as f32), cents: off, ..blank }
+    }
+
+    /// The window that is analysed, how many of its last samples are known, and the analysis without a pitch.
+    fn spectrum_of(samples: &[f32], rate_hz: f64) -> (Vec<f64>, usize, Self) {
+        let latest = &samples[samples.len().saturating_sub(WINDOW)..];
+        let mut heard = vec![0.0; WINDOW - latest.len()];
+        heard.extend(latest.iter().map(|&sample| if sample.is_finite() { f64::from(sample) } else { 0.0 }));
+        let spectrum = spectrum::hann_spectrum_db(&heard, rate_hz);
+        let count = (HIGHEST_HZ / spectrum.bin_hz) as usize;
+        let level_db = spectrum.level_db.iter().take(count).map(|&db| (db as f32).max(FLOOR_DB)).collect();
+        let blank = Self { bin_hz: spectrum.bin_hz as f32, level_db, ..Self::default() };
+        (heard, latest.len(), blank)
     }
 }
 
@@ -79,6 +91,20 @@ mod tests {
                 parts.iter().zip(1..).map(|(part, k)| part * (phase * f64::from(k)).sin() as f32).sum()
             })
             .collect()
+    }
+
+    #[test]
+    fn in_a_chord_the_pitch_is_that_of_the_wanted_note() {
+        let rate_hz = 48_000.0;
+        let [low, high] = [tone(146.8, rate_hz, &[0.3, 0.0, 0.1]), tone(221.0, rate_hz, &[0.3, 0.0, 0.1])];
+        let both: Vec<f32> = low.iter().zip(&high).map(|(a, b)| a + b).collect();
+        for (wanted_hz, hz) in [(146.83, 146.8), (220.0, 221.0)] {
+            let heard = SoundAnalysis::of_chord(&both, rate_hz, wanted_hz);
+            assert!((heard.f0_hz.unwrap() - hz).abs() < 0.2, "{:?}", heard.f0_hz);
+            assert!((f64::from(heard.cents.unwrap()) - cents(f64::from(hz), wanted_hz)).abs() < 2.0);
+            assert!(heard.harmonics_db.is_empty());
+        }
+        assert_eq!(SoundAnalysis::of_chord(&[], rate_hz, 220.0).f0_hz, None);
     }
 
     #[test]

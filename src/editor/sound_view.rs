@@ -10,7 +10,7 @@ use egui_plot::Points;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, slider};
-use crate::editor::pitch_needle;
+use crate::editor::pitch_needle::{self, NO_SOUND};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::sound_analysis::FLOOR_DB;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -177,14 +177,15 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     let width = ui.available_width();
     pitch_needle::needle(ui, snapshot, width);
     let heard = &snapshot.heard;
-    let pitch = heard.f0_hz.map_or_else(|| "no sound".into(), |hz| format!("{hz:.2} Hz"));
+    let pitch = heard.f0_hz.map_or_else(|| NO_SOUND.into(), |hz| format!("{hz:.2} Hz"));
     ui.label(egui::RichText::new(pitch).color(c.quiet));
-    if let Some(balance) = balance_db(&heard.harmonics_db) {
-        let text = format!("odd over even harmonics {balance:+.0} dB");
-        ui.label(egui::RichText::new(text).color(c.quiet)).on_hover_text(
-            "Power of harmonics 1, 3, 5 ... over the power of harmonics 2, 4, 6 ...: 10 to 25 dB for a low clarinet, most when it is soft; about 0 dB for a saxophone",
-        );
-    }
+    // The line stays when the sound ends: nothing below it moves under the pointer.
+    let balance =
+        balance_db(&heard.harmonics_db).map_or_else(|| "\u{2013}".to_owned(), |db| format!("{db:+.0} dB"));
+    let text = format!("odd over even harmonics {balance}");
+    ui.label(egui::RichText::new(text).color(c.quiet)).on_hover_text(
+        "Power of harmonics 1, 3, 5 ... over the power of harmonics 2, 4, 6 ...: 10 to 25 dB for a low clarinet, most when it is soft; about 0 dB for a saxophone",
+    );
     choice(ui, hands, "tune");
     slider(ui, hands, "a4");
     heading(ui, "Sound");

@@ -17,25 +17,34 @@ use crate::editor::theme::Colours;
 
 /// The tool tip of a parameter: the word, what it does to sound and feel, how to move it.
 pub fn teach(ui: &mut Ui, id: &str, how: &str) {
+    let can_feel = ui.data(|data| data.get_temp::<bool>(can_feel_id()).unwrap_or_default());
     let c = Colours::here(ui);
     let Some(term) = terms::of(id) else { return };
     ui.set_max_width(300.0);
     // Names of other parameters stand between asterisks, as documents print them.
     let plain = |text: &str| text.replace('*', "");
     ui.label(egui::RichText::new(plain(term.meaning)).strong());
-    for (what, text) in [("Sound", term.sound), ("Feel", term.feel)] {
+    // Who has no knob feels nothing.
+    let feel = if can_feel { term.feel } else { "" };
+    for (what, text) in [("Sound", term.sound), ("Feel", feel)] {
         let text = plain(text);
         if !text.is_empty() {
-            ui.label(egui::RichText::new(if term.feel.is_empty() {
-                text
-            } else {
-                format!("{what}: {text}")
-            }));
+            ui.label(if feel.is_empty() { text } else { format!("{what}: {text}") });
         }
     }
     if !how.is_empty() {
         ui.label(egui::RichText::new(how).font(theme::small()).color(c.quiet));
     }
+}
+
+/// Where the window keeps whether tips say what the hand feels.
+fn can_feel_id() -> egui::Id {
+    egui::Id::unique("tips say what the hand feels")
+}
+
+/// From now on tips say what the hand feels, or do not.
+pub fn say_feel(ui: &Ui, can_feel: bool) {
+    ui.data_mut(|data| data.insert_temp(can_feel_id(), can_feel));
 }
 
 /// A row of choices side by side under a name; a list to open where they would not fit.
@@ -93,6 +102,8 @@ pub fn list(ui: &mut Ui, name: &str, texts: &[String], chosen: &mut usize) -> Re
 pub fn segments(ui: &mut Ui, name: &str, texts: &[String], chosen: &mut usize) -> Response {
     let c = Colours::here(ui);
     let (rect, whole) = ui.allocate_exact_size(vec2(ui.available_width(), 24.0), Sense::hover());
+    // The cells lie over the frame: what points at one of them points at the whole.
+    let mut all = whole.clone();
     let painter = ui.painter().clone();
     painter.rect_filled(rect, CornerRadius::same(theme::SMALL_RADIUS + 1), c.raised);
     let width = rect.width() / texts.len().max(1) as f32;
@@ -101,7 +112,7 @@ pub fn segments(ui: &mut Ui, name: &str, texts: &[String], chosen: &mut usize) -
             pos2(rect.left() + index as f32 * width, rect.top()),
             vec2(width, rect.height()),
         );
-        let response = ui.interact(cell, whole.id.with(index), Sense::click());
+        let response = ui.interact(cell, whole.id.with(("cell", index)), Sense::click());
         if response.clicked() {
             *chosen = index;
         }
@@ -121,8 +132,9 @@ pub fn segments(ui: &mut Ui, name: &str, texts: &[String], chosen: &mut usize) -
         response.widget_info(|| {
             WidgetInfo::selected(Role::RadioButton, true, is_chosen, format!("{name}: {text}"))
         });
+        all |= response;
     }
-    whole
+    all
 }
 
 /// A switch with its name.

@@ -176,7 +176,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("resp", BREATH, "Breath response", choice(&[("play", "Played"), ("phys", "Physical")]))
         .help(
             "What a breath source sets",
-            "Played: the dynamic. Every note begins at a breath of 4 of 127, equal steps of breath are equal steps of level, and the lip follows as a player's does. Physical: the mouth pressure, in a straight line, on a lip that stays. Projects from before this choice are physical.",
+            "Played: the breath sets the loudness, in even steps, and every note begins at a breath of 4 of 127; the lip moves as a player's does. Physical: the breath sets the mouth pressure, in a straight line, and the lip does not move. Projects from before this choice are physical.",
             "",
         )
         .sets(Sets::Choice(|settings, at| settings.breath_response = nth(at, BreathResponse::ALL)))
@@ -184,7 +184,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("bcurve", BREATH, "Breath curve", number([0.5, 2.0], 1.0, 2, ""))
         .help(
             "Curve from a controller's breath to the dynamic, with the breath response *Played*",
-            "Above 1, soft notes get more of the controller's range; below 1, loud notes do. The velocity of keys does not pass it.",
+            "Above 1, soft notes get more of the controller's range; below 1, loud notes do. It does not change the velocity of keys.",
             "",
         )
         .sets(Sets::Number(SettingNumber::BreathCurve))
@@ -728,7 +728,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .flag("--room-decay"),
     entry("rtone", ROOM, "Room tone", percent(0.5))
         .help(
-            "How long the room's high tones last beside its low ones",
+            "From a dark room, where high tones die away sooner than low ones, to a bright one",
             "Low is dark, as with curtains and people. High is bright, as with bare stone.",
             "",
         )
@@ -925,7 +925,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("tract", TECHNIQUES, "Vocal tract", percent(0.0))
         .help(
             "How strongly the player tunes the vocal tract: from an open throat to a tuned one",
-            "A tuned tract pulls the note to its own resonance, *Tract interval*: bends, scoops, throat colour.",
+            "The further it is tuned, the more it pulls the note to its own resonance, which *Tract interval* sets: bends, scoops, throat colour.",
             "",
         )
         .sets(Sets::Number(SettingNumber::TractAmount))

@@ -152,8 +152,11 @@ impl Watch {
 fn lists() -> DeviceLists {
     let host = cpal::default_host();
     let name = |device: cpal::Device| device.description().ok().map(|about| about.name().to_owned());
-    let outputs = host.output_devices().map(|all| all.filter_map(name).collect()).unwrap_or_default();
-    let inputs = host.input_devices().map(|all| all.filter_map(name).collect()).unwrap_or_default();
+    // ALSA offers one that drops all sound, and brings none.
+    let is_real = |name: &String| !name.starts_with("Discard all samples");
+    let names = |all: &mut dyn Iterator<Item = cpal::Device>| all.filter_map(name).filter(is_real).collect();
+    let outputs = host.output_devices().map(|mut all| names(&mut all)).unwrap_or_default();
+    let inputs = host.input_devices().map(|mut all| names(&mut all)).unwrap_or_default();
     DeviceLists {
         outputs: without_doubles(outputs),
         inputs: without_doubles(inputs),

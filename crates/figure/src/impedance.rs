@@ -107,6 +107,9 @@ pub fn fingering(about: &FingeringImpedance<'_>) -> Figure {
     figure.panel(upper).panel(lower).size(1_600, 1_150)
 }
 
+/// A mode this far from a multiple of the note, cents, still is one of its partials' resonances.
+const NEAR_CENTS: f64 = 100.0;
+
 /// Discs on the modes, with frequency and cents; words that would run into each other go up in steps.
 fn modes(mut panel: Panel, about: &FingeringImpedance<'_>, (first_hz, last_hz): (f64, f64)) -> Panel {
     let shown: Vec<&Peak> =
@@ -130,8 +133,19 @@ fn modes(mut panel: Panel, about: &FingeringImpedance<'_>, (first_hz, last_hz): 
             height_db = db + step_db;
         }
         before = Some((f_hz, height_db));
+        let (_, dot_db) = at(mode);
+        if height_db > dot_db {
+            // Whose words they are.
+            let leader = Line::new("", [(f_hz, dot_db + 1.0), (f_hz, height_db + 1.0)]);
+            panel = panel.with(leader.colour(Colour::Pale));
+        }
         let (_, cents) = from_harmonic(f_hz, about.sounding_hz);
-        let text = format!("{f_hz:.0} Hz {cents:+.0}");
+        // A mode between two multiples, or below the first, belongs to none.
+        let text = if cents.abs() <= NEAR_CENTS {
+            format!("{f_hz:.0} Hz {cents:+.0}")
+        } else {
+            format!("{f_hz:.0} Hz")
+        };
         panel = panel.with(Text::new(f_hz, height_db + 1.0, text).anchor(Anchor::Above));
     }
     panel
@@ -143,10 +157,19 @@ pub struct NotePeaks {
     pub written: WrittenNote,
     /// Its pitch, Hz.
     pub sounding_hz: f64,
-    /// Which of its peaks sounds, from 1.
-    pub mode: usize,
-    /// Its first peaks, lowest first.
+    /// Its first peaks, lowest first; the one that sounds among them.
     pub peaks: Vec<Peak>,
+    /// How many of them are drawn, besides the one that sounds.
+    pub shown: usize,
+}
+
+impl NotePeaks {
+    /// The peak that sounds: the nearest to the note, by interval. Its number depends on how the peaks are calculated, where one is
+    /// so low in one model that another does not have it.
+    fn sounds(&self) -> Option<&Peak> {
+        let apart = |peak: &Peak| cents(peak.f_hz, self.sounding_hz).abs();
+        self.peaks.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
+    }
 }
 
 /// Most peaks that the legend of a chart names one by one; of more, it names the first and the last.
@@ -162,7 +185,7 @@ pub fn chart(instrument: &str, notes: Vec<String>, rows: &[NotePeaks]) -> Figure
     let axis = |label: &str| Axis::notes(label);
     let x = |row: &NotePeaks| f64::from(row.written.0);
     let highest_hz = highest_peak_hz(rows);
-    let count = rows.iter().map(|row| row.peaks.len()).max().unwrap_or(0);
+    let count = rows.iter().map(|row| row.peaks.len().min(row.shown)).max().unwrap_or(0);
     let mut places = Panel::new("Where they are", axis(""), frequencies(rows)).weight(2.4);
     for multiple in [1, 3, 5] {
         let line = rows.iter().map(|row| (x(row), f64::from(multiple) * row.sounding_hz));
@@ -176,28 +199,32 @@ pub fn chart(instrument: &str, notes: Vec<String>, rows: &[NotePeaks]) -> Figure
         let name = if is_named { format!("peak {}", mode + 1) } else { String::new() };
         places = places.with(Points::new(name, points).colour(Colour::of_family(mode, count)).size(3.5));
     }
-    let own = |row: &NotePeaks| row.peaks.get(row.mode.checked_sub(1)?).cloned();
-    let sounding = rows.iter().filter_map(|row| Some((x(row), own(row)?.f_hz)));
+    let sounding = rows.iter().filter_map(|row| Some((x(row), row.sounds()?.f_hz)));
     places = places.with(Points::new("sounds", sounding).colour(Colour::Ink).shape(Shape::Ring).size(6.5));
 
-    let off = rows.iter().filter_map(|row| Some((x(row), cents(own(row)?.f_hz, row.sounding_hz))));
+    let off = rows.iter().filter_map(|row| Some((x(row), cents(row.sounds()?.f_hz, row.sounding_hz))));
     let off = Panel::new("The peak that sounds, from its note", axis(""), Axis::linear("cents"))
         .with(Mark::new(Direction::Y, 0.0, ""))
         .with(Points::new("", off));
-    let high = rows.iter().filter_map(|row| Some((x(row), 20.0 * own(row)?.mag_over_zc.log10())));
+    let high = rows.iter().filter_map(|row| Some((x(row), 20.0 * row.sounds()?.mag_over_zc.log10())));
     let high = Panel::new("Its height", axis("written note"), Axis::linear("|Z| / Zc, dB"))
         .with(Points::new("", high));
     figure.panel(places).panel(off).panel(high).size(1_600, 1_500)
 }
 
 fn highest_peak_hz(rows: &[NotePeaks]) -> f64 {
-    rows.iter().flat_map(|row| &row.peaks).map(|peak| peak.f_hz).fold(0.0, f64::max)
+    drawn(rows).map(|peak| peak.f_hz).fold(0.0, f64::max)
+}
+
+/// The peaks that a chart draws.
+fn drawn(rows: &[NotePeaks]) -> impl Iterator<Item = &Peak> {
+    rows.iter().flat_map(|row| row.peaks.iter().take(row.shown).chain(row.sounds()))
 }
 
 /// An axis for all peaks, with three ticks a factor of ten.
 fn frequencies(rows: &[NotePeaks]) -> Axis {
     let high_hz = highest_peak_hz(rows);
-    let low_hz = rows.iter().flat_map(|row| &row.peaks).map(|peak| peak.f_hz).fold(high_hz, f64::min);
+    let low_hz = drawn(rows).map(|peak| peak.f_hz).fold(high_hz, f64::min);
     let axis = Axis::log("frequency, Hz");
     if low_hz <= 0.0 {
         return axis;

@@ -162,7 +162,8 @@ impl Plan {
     }
 
     pub fn from_csv(text: &str) -> Result<Self, String> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+        let mut reader =
+            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
         let names: Vec<_> =
             reader.headers().map_err(|error| error.to_string())?.iter().map(str::to_owned).collect();
         if names.iter().all(String::is_empty) {
@@ -173,7 +174,12 @@ impl Plan {
             .map(|record| {
                 let record = record.map_err(|error| {
                     let line = error.position().map_or(0, csv::Position::line);
-                    format!("line {line} has not as many fields as the first line")
+                    match error.kind() {
+                        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                            format!("line {line} has {len} fields, the line of names has {expected_len}")
+                        }
+                        _ => format!("line {line}: {error}"),
+                    }
                 })?;
                 let line = record.position().map(|at| line_of_record(text, at.byte() as usize));
                 Ok(Variation { values: record.iter().map(str::to_owned).collect(), line })

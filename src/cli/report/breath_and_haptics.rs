@@ -351,7 +351,7 @@ impl<'a> BreathAndHaptics<'a> {
             })
             .fold(0.0, f64::max);
         let outcome = format!(
-            "The mark of the torque lies within {:.1} % of where the sound begins, for every note and both laws.",
+            "The mark of the torque lies within {:.1} % of where the sound begins by theory, for every note and both laws.",
             100.0 * farthest
         );
         Plate {

@@ -14,13 +14,15 @@ use crate::parameters::{Kind, Parameter, Value};
 const LIST_HEIGHT: f32 = 320.0;
 
 /// What the list offers first. Some devices need nothing else, so that their names would stand where nobody has chosen one.
-static ANY_DEVICE: LazyLock<ControllerMap> = LazyLock::new(|| ControllerMap {
+static ANY_DEVICE: LazyLock<ControllerMap> = LazyLock::new(|| {
+    ControllerMap {
     name: "Any keyboard or controller".to_owned(),
     shows:
-        "As in a new instance: keys blow by their velocity; CC2, CC11 or pressure takes over when it comes."
+        "As in a new instance: keys blow by their velocity; CC2, CC11 or pressure takes over as soon as it moves."
             .to_owned(),
     links: Vec::new(),
     values: Vec::new(),
+}
 });
 
 /// Whether parameters and these links are as a device needs them.
@@ -51,7 +53,9 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
     let maps = || std::iter::once(&*ANY_DEVICE).chain(factory::all());
     // Older projects do not say which one was chosen.
     let fitting = || maps().find(|map| is_set(hands, &all, map));
-    let now = links.device().filter(|map| map.links == all).or_else(fitting);
+    // Where nothing is linked, any keyboard or controller plays, whatever a preset has moved since.
+    let any = || all.is_empty().then_some(&*ANY_DEVICE);
+    let now = links.device().filter(|map| map.links == all).or_else(fitting).or_else(any);
     let mut chosen = None;
     let text = now.map_or("Choose a device", |map| map.name.as_str());
     let response = list.height(LIST_HEIGHT).selected_text(text).show_ui(ui, |ui| {

@@ -7,7 +7,7 @@ use egui::{
 };
 
 use crate::editor::fingering_search::FingeringRow;
-use crate::editor::hole_names::hole_title;
+use crate::editor::hole_names::{fingers_title, hole_title};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::editor::widgets::one_line;
@@ -88,7 +88,8 @@ pub fn draw_row<'a>(
         let ink = ink(c, is_tried(&row.note, file, tried));
         let chart = if row.is_of_chart { "chart" } else { "" };
         let texts = [
-            format!("{:+.0}", row.note.cents),
+            // Without the sign of a small negative number.
+            format!("{:+.0}", row.note.cents.round() + 0.0),
             format!("{:.0} %", 100.0 * row.note.gamma_on),
             format!("{:.1}", row.note.cost),
             chart.to_owned(),
@@ -141,17 +142,9 @@ fn write(painter: &Painter, place: Rect, text: &str, ink: Color32) {
 
 /// What the fingers press, cut where it is too long.
 fn fingers(ui: &Ui, place: Rect, found: &Found, ink: Color32) {
-    let words = one_line(ui, &presses(found), theme::small(), ink, place.width() - 2.0 * PAD);
+    let words = one_line(ui, &fingers_title(&found.fingers), theme::small(), ink, place.width() - 2.0 * PAD);
     let y = place.center().y - 0.5 * words.size().y;
     ui.painter().galley(pos2(place.left() + PAD, y), words, ink);
-}
-
-/// What the fingers press, as a reader says it.
-fn presses(found: &Found) -> String {
-    if found.fingers.trim().is_empty() {
-        return "no finger".to_owned();
-    }
-    found.fingers.replace("key", " key").replace("sliver", "sliver ").replace("side", "side ")
 }
 
 /// The ground of a fingering that can be clicked.
@@ -177,11 +170,11 @@ fn cell(
     if response.has_focus() {
         ui.painter().rect_stroke(place, round, Stroke::new(1.5, c.ink), StrokeKind::Inside);
     }
-    let label = format!("{name}: {}", presses(found));
+    let label = format!("{name}: {}", fingers_title(&found.fingers));
     response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_here, &label));
     response.on_hover_ui(|ui| {
         ui.set_max_width(300.0);
-        ui.strong(presses(found));
+        ui.strong(fingers_title(&found.fingers));
         let open = file.holes.iter().enumerate().filter(|(hole, _)| found.grip.open >> hole & 1 == 1);
         let open: Vec<String> = open.map(|(_, hole)| hole_title(&hole.name)).collect();
         ui.label(format!("Open: {}", if open.is_empty() { "none".to_owned() } else { open.join(", ") }));

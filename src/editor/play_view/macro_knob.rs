@@ -21,7 +21,7 @@ const KEYS: KeySteps = KeySteps { share: 0.02, has_vertical: true };
 const ARC: (f32, f32) = (0.75 * std::f32::consts::PI, 2.25 * std::f32::consts::PI);
 const HOW: &str = "Drag up or down, or the arrow keys; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
 /// Size of the field for a typed value, points.
-const FIELD: Vec2 = vec2(84.0, 22.0);
+const FIELD: Vec2 = vec2(84.0, 18.0);
 
 /// A main control.
 pub struct Macro {
@@ -112,7 +112,7 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
     let value_response =
         ui.interact(of_value.expand2(vec2(4.0, 1.0)), response.id.with("value"), Sense::CLICK);
     if is_typing {
-        type_value(ui, hands, of.id, Rect::from_center_size(of_value.center(), FIELD));
+        type_value(ui, hands, of.id, Rect::from_center_size(of_value.center(), FIELD), Align2::CENTER_CENTER);
     } else {
         painter.galley(at, words, ink);
         let is_entered = response.clicked() && response.has_focus() && ui.input(pressed_enter);
@@ -121,7 +121,7 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
         }
     }
     value_response.on_hover_cursor(CursorIcon::Text);
-    if has_ends {
+    if has_ends && !is_typing {
         let at = pos2(centre.x, bottom + 1.0);
         painter.text(
             at,

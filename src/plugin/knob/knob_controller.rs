@@ -177,7 +177,7 @@ impl KnobController {
                 t_us,
                 angle_deg,
                 velocity_deg_s: f64::from(state.velocity_deg_s),
-                torque_mnm: f64::from(state.torque_mnm),
+                torque_mnm: state.torque_mnm.map(f64::from),
                 written: shared
                     .note()
                     .and_then(|note| note.written(instrument.transposition()))

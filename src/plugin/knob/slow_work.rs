@@ -227,7 +227,9 @@ impl SlowWork {
         }
         moments.set_possible(Moment::Record, has_knob);
         let hand = self.hand_of(status);
-        if wanted && let Err(reason) = self.recorder.begin(&self.params, hand) {
+        let playing = self.instrument.current();
+        let name = playing.as_ref().map_or("", |playing| playing.model.file.name.as_str());
+        if wanted && let Err(reason) = self.recorder.begin(&self.params, name, hand) {
             self.params.moments.set_possible(Moment::Record, false);
             self.texts.take = Some(reason);
             return;

@@ -14,6 +14,7 @@ use crate::take_file::TakeFile;
 use chalumeau_core::instrument::Settings;
 use chalumeau_knob::touch::study::{StudySide, plan};
 use chalumeau_knob::touch::take::{Take, TakeHand, TakeMarks, TakeRow};
+use chalumeau_knob::touch::take_csv::instrument_remark;
 
 /// Environment variable that names another folder for takes.
 const TAKES: &str = "CHALUMEAU_TAKES";
@@ -45,10 +46,15 @@ impl TakeRecorder {
         Self { recording: None, sound, waiting: VecDeque::new() }
     }
 
-    /// Opens a new take of this hand, if none is open.
-    pub fn begin(&mut self, params: &ChalumeauParams, hand: TakeHand) -> Result<(), String> {
+    /// Opens a new take on the instrument of this name, of this hand, if none is open.
+    pub fn begin(
+        &mut self,
+        params: &ChalumeauParams,
+        instrument: &str,
+        hand: TakeHand,
+    ) -> Result<(), String> {
         if self.recording.is_none() {
-            self.recording = Some(create(params, hand)?);
+            self.recording = Some(create(params, instrument, hand)?);
         }
         Ok(())
     }
@@ -125,7 +131,7 @@ pub fn marks(params: &ChalumeauParams, settings: &Settings) -> TakeMarks {
 }
 
 /// Creates a new take in the folder of takes.
-fn create(params: &ChalumeauParams, hand: TakeHand) -> Result<Recording, String> {
+fn create(params: &ChalumeauParams, instrument: &str, hand: TakeHand) -> Result<Recording, String> {
     let folder = match std::env::var_os(TAKES) {
         Some(folder) => PathBuf::from(folder),
         None => dirs::document_dir()
@@ -148,13 +154,14 @@ fn create(params: &ChalumeauParams, hand: TakeHand) -> Result<Recording, String>
         })
         .find(|path| !path.exists())
         .ok_or_else(|| format!("{} has too many takes of this second", folder.display()))?;
-    let begun = NewFile::create(&path, false).and_then(|file| TakeFile::begin(file, &remarks(params, hand)));
+    let begun = NewFile::create(&path, false)
+        .and_then(|file| TakeFile::begin(file, &remarks(params, instrument, hand)));
     let writer = begun.map_err(|reason| reason.to_string())?;
     Ok(Recording { writer, path, rows: 0, error: None })
 }
 
 /// The lines above a take's columns: program, feel and hand at the beginning, and the order of the study's trials.
-fn remarks(params: &ChalumeauParams, hand: TakeHand) -> Vec<String> {
+fn remarks(params: &ChalumeauParams, instrument: &str, hand: TakeHand) -> Vec<String> {
     let knob = &params.knob;
     let feel = feel_design(knob);
     let mut remarks = vec![
@@ -162,6 +169,7 @@ fn remarks(params: &ChalumeauParams, hand: TakeHand) -> Vec<String> {
             "Chalumeau {} take; t_us and heard_us are the host's clock, angle from the knob's zero",
             env!("CARGO_PKG_VERSION")
         ),
+        instrument_remark(instrument),
         feel_flags::remark(&feel),
         hand.remark(),
         format!(

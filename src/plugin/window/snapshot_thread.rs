@@ -32,7 +32,7 @@ use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::{KeyPitches, Settings};
-use chalumeau_core::units::{Air, SoundingNote};
+use chalumeau_core::units::Air;
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::{LinkStatus, Phase, RuntimeDir};
 #[cfg(feature = "devices")]
@@ -137,7 +137,7 @@ impl SnapshotThread {
         self.files.show(&mut snapshot);
         show_inside(&mut snapshot, &inside);
         self.show_instrument(&mut snapshot, current.as_ref(), inside.now.fingering);
-        snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);
+        snapshot.heard = self.analyse_sound(&inside, &settings);
         snapshot.output_peak = f32::from_bits(self.shared.output_peak.swap(0, Ordering::Relaxed));
         snapshot.microphone = self.shared.microphone.load();
         snapshot.hears_midi = self.hears_midi(inside.breath_sources.messages());
@@ -284,14 +284,15 @@ impl SnapshotThread {
         (10.0 * (power / count as f32).max(1e-12).log10()).max(FLOOR_DB)
     }
 
-    fn analyse_sound(
-        &mut self,
-        rate_hz: f64,
-        sounding: Option<SoundingNote>,
-        settings: &Settings,
-    ) -> SoundAnalysis {
-        let wanted = sounding.map(|note| note.frequency_hz(f64::from(settings.a4_hz)));
-        SoundAnalysis::of(self.heard.make_contiguous(), rate_hz, wanted)
+    fn analyse_sound(&mut self, inside: &AudioSnapshot, settings: &Settings) -> SoundAnalysis {
+        let wanted = inside.now.sounding.map(|note| note.frequency_hz(f64::from(settings.a4_hz)));
+        let sound = self.heard.make_contiguous();
+        match wanted {
+            Some(wanted_hz) if inside.is_chord => {
+                SoundAnalysis::of_chord(sound, inside.host_rate_hz, wanted_hz)
+            }
+            wanted => SoundAnalysis::of(sound, inside.host_rate_hz, wanted),
+        }
     }
 
     /// How much the knob's status concerns the user: an alarm, or a port that does not open, asks for something.
@@ -331,10 +332,7 @@ impl SnapshotThread {
             let (is_key_down, breath) = (inside.now.key.is_some(), sources.value(input).unwrap_or(0.0));
             if is_key_down && breath == 0.0 {
                 // Else a key that is silent would puzzle who has forgotten a controller.
-                add(
-                    Severity::Note,
-                    format!("no breath: {} is at 0 (Panic gives it to the keys)", input.title()),
-                );
+                add(Severity::Note, format!("Panic lets the keys blow again: {} is at 0", input.title()));
             } else {
                 add(Severity::Good, format!("breath: {}", input.title()));
             }

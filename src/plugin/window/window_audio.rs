@@ -23,6 +23,8 @@ const KEYS_PER_BLOCK: usize = 8;
 pub struct AudioSnapshot {
     /// What the player is doing.
     pub now: PlayerState,
+    /// Others are heard on other notes.
+    pub is_chord: bool,
     /// The latest moments inside the mouthpiece, oldest first.
     pub moments: Box<[ScopeSample; SCOPE_SAMPLES]>,
     /// Moments per second.
@@ -47,6 +49,7 @@ impl Default for AudioSnapshot {
                 dynamic: None,
                 chosen: None,
             },
+            is_chord: false,
             moments: Box::new([ScopeSample::default(); SCOPE_SAMPLES]),
             moments_hz: 48_000.0,
             host_rate_hz: 48_000.0,
@@ -140,6 +143,7 @@ impl WindowAudio {
         self.shown = number;
         let inside = self.inside.input_buffer_mut();
         inside.now = clarinet.player_state();
+        inside.is_chord = instrument.ensemble().plays_chord();
         inside.moments.copy_from_slice(moments);
         inside.moments_hz = scope.rate_hz(clarinet.internal_rate_hz());
         inside.host_rate_hz = instrument.rate_hz();

@@ -149,7 +149,9 @@ impl FeelRefused {
                     "lower Feel torque to {strength_mnm:.0} mNm or less, lower Feel contrast, or allow more torque"
                 ));
             }
-            Self::Stiffness { .. } => "lower Feel torque, soften the wall, or lengthen the travel",
+            Self::Stiffness { .. } => {
+                "lower Feel torque or the mark, soften the wall, or lengthen the travel"
+            }
             Self::Push { .. } => {
                 "lower the mark or Feel torque, lengthen the travel, or use the pressure law"
             }

@@ -480,6 +480,13 @@ impl Ensemble {
         self.seats[0].pan
     }
 
+    /// Whether players who can be heard finger different notes.
+    pub fn plays_chord(&self) -> bool {
+        let heard = self.seats.iter().filter(|seat| !seat.is_silent());
+        let mut notes = heard.map(|seat| seat.clarinet.player_state().fingering);
+        notes.next().is_some_and(|first| notes.any(|note| note != first))
+    }
+
     /// Whether one player is silent and at rest. In unison all are, for every player.
     pub fn is_silent_player(&self, number: usize) -> bool {
         match self.players.split {

@@ -72,8 +72,8 @@ pub struct StateSample {
     pub angle_deg: f32,
     /// Degrees per second.
     pub velocity_deg_s: f32,
-    /// The knob's own command after all limits, mNm; 0 where it is not told.
-    pub torque_mnm: f32,
+    /// The knob's own command after all limits, mNm; `None` where it is not told.
+    pub torque_mnm: Option<f32>,
     /// Last FEEL accepted.
     pub feel_id: u8,
     /// `wire::Flags`.

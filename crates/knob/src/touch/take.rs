@@ -16,8 +16,8 @@ pub struct TakeRow {
     pub angle_deg: f64,
     /// Its speed, degrees/s.
     pub velocity_deg_s: f64,
-    /// Torque of the motor, mNm.
-    pub torque_mnm: f64,
+    /// Torque that the knob commands, mNm, if it says so.
+    pub torque_mnm: Option<f64>,
     /// Written note that is fingered, if any.
     pub written: Option<u8>,
     /// Mouth pressure over closing pressure.
@@ -53,12 +53,25 @@ pub struct TakeHand {
 pub struct Take {
     pub(super) rows: Vec<TakeRow>,
     pub(super) hand: Option<TakeHand>,
+    pub(super) reed: Option<(f64, f64)>,
+    pub(super) has_one_reed: bool,
+    pub(super) instrument: Option<String>,
 }
 
 impl Take {
     /// All rows, in order of time; there is at least one.
     pub fn rows(&self) -> &[TakeRow] {
         &self.rows
+    }
+
+    /// H and k of the reed in its first row that tells them, and whether all that do tell the same.
+    pub fn reed(&self) -> Option<((f64, f64), bool)> {
+        self.reed.map(|reed| (reed, self.has_one_reed))
+    }
+
+    /// Name of the instrument that was played, if it says so.
+    pub fn instrument(&self) -> Option<&str> {
+        self.instrument.as_deref()
     }
 
     /// How its angles blow: as it says or, where it says nothing, with `usual` on a knob that gave the feel.

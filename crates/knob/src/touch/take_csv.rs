@@ -2,7 +2,8 @@
 //!
 //! The first line names the columns; lines that begin with `#` are comments. `t_us` and `angle_deg` are required, at any
 //! place; the other columns may be missing or empty. Unknown columns are ignored. Time may start anywhere but must not
-//! go back; a replay starts at the first row. A comment `# hand` above the columns says how the angles blow.
+//! go back; a replay starts at the first row. Above the columns, a comment `# hand` says how the angles blow, and `# instrument` what was
+//! played.
 
 use crate::touch::study::StudySide;
 use crate::touch::take::{Take, TakeHand, TakeMarks, TakeRow};
@@ -21,6 +22,8 @@ const MOST_MEASURED: f64 = 1e9;
 
 /// How a comment about the hand begins.
 const HAND: &str = "hand ";
+/// How a comment about the instrument begins.
+const INSTRUMENT: &str = "instrument ";
 /// Most bytes of the comments above the columns that are read as such.
 const HEAD_MOST: u64 = 65_536;
 
@@ -77,6 +80,9 @@ impl Take {
         }
         let comments = String::from_utf8_lossy(&head).into_owned();
         let hand = comments.lines().find_map(TakeHand::read).transpose()?;
+        let named =
+            |line: &str| Some(line.strip_prefix('#')?.trim_start().strip_prefix(INSTRUMENT)?.to_owned());
+        let instrument = comments.lines().find_map(named);
         // The reader counts the lines.
         let from = head.chain(from);
         let mut reader = csv::ReaderBuilder::new()
@@ -86,6 +92,7 @@ impl Take {
             .from_reader(from);
         let columns = Columns::find(reader.headers()?)?;
         let mut rows: Vec<TakeRow> = Vec::new();
+        let (mut reed, mut has_one_reed) = (None, true);
         let mut record = csv::StringRecord::new();
         while reader.read_record(&mut record)? {
             if rows.len() == MOST_ROWS {
@@ -95,10 +102,22 @@ impl Take {
             if let Some(before) = rows.last().map(|last| last.t_us).filter(|&before| before > row.t_us) {
                 return Err(TakeError::Backwards { line: line(&record), before, now: row.t_us });
             }
+            if let Some(own) = columns.reed(&record)? {
+                has_one_reed &= *reed.get_or_insert(own) == own;
+            }
             rows.push(row);
         }
-        if rows.is_empty() { Err(TakeError::Empty) } else { Ok(Self { rows, hand }) }
+        if rows.is_empty() {
+            Err(TakeError::Empty)
+        } else {
+            Ok(Self { rows, hand, reed, has_one_reed, instrument })
+        }
     }
+}
+
+/// The comment that says which instrument was played, without its `#`.
+pub fn instrument_remark(name: &str) -> String {
+    format!("{INSTRUMENT}{name}")
 }
 
 impl TakeHand {
@@ -144,6 +163,8 @@ struct Columns {
     written: Column,
     gamma: Column,
     feel_id: Column,
+    h: Column,
+    k: Column,
 }
 
 impl Columns {
@@ -163,7 +184,18 @@ impl Columns {
             written: column("written_midi"),
             gamma: column("gamma"),
             feel_id: column("feel_id"),
+            h: column("h"),
+            k: column("k"),
         })
+    }
+
+    /// H and k of a row, if it tells both.
+    fn reed(&self, record: &csv::StringRecord) -> Result<Option<(f64, f64)>, TakeError> {
+        if [self.h, self.k].iter().any(|&column| cell(record, column).is_empty()) {
+            return Ok(None);
+        }
+        let value = |column| number(record, column, MOST_MEASURED, "a number, or empty");
+        Ok(Some((value(self.h)?, value(self.k)?)))
     }
 
     fn row(&self, record: &csv::StringRecord) -> Result<TakeRow, TakeError> {
@@ -183,7 +215,10 @@ impl Columns {
             t_us: t_us.map_err(|_| refuse(record, self.t_us, "a whole number of microseconds"))?,
             angle_deg: number(record, self.angle_deg, MOST_DEG, "degrees within 100 turns")?,
             velocity_deg_s: measured(self.velocity_deg_s)?,
-            torque_mnm: measured(self.torque_mnm)?,
+            torque_mnm: match cell(record, self.torque_mnm) {
+                "" => None,
+                _ => Some(measured(self.torque_mnm)?),
+            },
             written: small(self.written)?,
             gamma: measured(self.gamma)?,
             feel_id: small(self.feel_id)?.unwrap_or(0),
@@ -236,9 +271,10 @@ impl<W: Write> TakeWriter<W> {
     pub fn write(&mut self, row: &TakeRow, marks: &TakeMarks) -> io::Result<()> {
         let TakeRow { t_us, angle_deg, velocity_deg_s, torque_mnm, written, gamma, feel_id } = *row;
         let written = written.map_or_else(String::new, |written| written.to_string());
+        let torque_mnm = torque_mnm.map_or_else(String::new, |mnm| format!("{mnm:.0}"));
         write!(
             self.out,
-            "{t_us},{angle_deg:.2},{velocity_deg_s:.1},{torque_mnm:.0},{written},{gamma:.5},{feel_id},"
+            "{t_us},{angle_deg:.2},{velocity_deg_s:.1},{torque_mnm},{written},{gamma:.5},{feel_id},"
         )?;
         match marks.reed {
             Some((h, k)) => write!(self.out, "{h:.5},{k:.5},")?,
@@ -295,7 +331,7 @@ mod tests {
                 t_us: 1_000_000 + 2_000 * n,
                 angle_deg: -3.25 + n as f64,
                 velocity_deg_s: 500.0,
-                torque_mnm: -17.0,
+                torque_mnm: (n > 20).then_some(-17.0),
                 written: (n > 10).then_some(60),
                 gamma: 0.5,
                 feel_id: n as u8,
@@ -342,9 +378,16 @@ mod tests {
         let usual = KnobDesign::default();
         let design = KnobDesign { zero_deg: 40.5, full_deg: 400.0, curve: 2.0, ..usual };
         let hand = TakeHand { design, feels: false };
-        let mut writer = TakeWriter::new(Vec::new(), &["C4".to_owned(), hand.remark()]).unwrap();
-        writer.write(&TakeRow::default(), &TakeMarks::default()).unwrap();
-        assert_eq!(Take::read(&*writer.into_inner()).unwrap().hand(usual), hand);
+        let comments = ["C4".to_owned(), hand.remark(), instrument_remark("my #1")];
+        let mut writer = TakeWriter::new(Vec::new(), &comments).unwrap();
+        for reed in [None, Some((2.0, 0.5)), Some((2.0, 0.5))] {
+            writer.write(&TakeRow::default(), &TakeMarks { reed, ..TakeMarks::default() }).unwrap();
+        }
+        let take = Take::read(&*writer.into_inner()).unwrap();
+        assert_eq!((take.hand(usual), take.instrument()), (hand, Some("my #1")));
+        assert_eq!(take.reed(), Some(((2.0, 0.5), true)));
+        let two = read("t_us,angle_deg,h,k\n0,1,2,0.5\n1,1,3,0.5\n2,1,,\n").unwrap();
+        assert_eq!((two.reed(), two.instrument()), (Some(((2.0, 0.5), false)), None));
         let silent = read("t_us,angle_deg\n0,1\n").unwrap();
         assert_eq!(silent.hand(design), TakeHand { design, feels: true });
         for wrong in [hand.remark().replace("curve=2", "curve=9"), "hand over".to_owned()] {

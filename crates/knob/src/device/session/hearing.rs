@@ -166,7 +166,7 @@ impl HostSession {
             t_us: state.t_us,
             angle_deg: state.angle_deg() as f32,
             velocity_deg_s: VELOCITY_DEG_S as f32 * f32::from(state.velocity),
-            torque_mnm: f32::from(state.torque),
+            torque_mnm: Some(f32::from(state.torque)),
             feel_id: state.feel_id,
             flags: state.flags.0,
             period_us: self.period_us(),
