@@ -801,6 +801,32 @@ fn the_recordings_are_of_a_good_length_and_level() {
 }
 
 #[test]
+fn a_note_takes_other_holes() {
+    let d = tempfile::tempdir().unwrap();
+    let render = "render --seconds 0.6 --no-noise --gamma 0.6 --force";
+    let sound = |more: &str| {
+        let line = format!("{render} --out n.wav");
+        let output = chalumeau(d.path(), words(&line).chain(more.split('|')));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        fs::read(d.path().join("n.wav")).unwrap()
+    };
+    // The chart's own holes of C4, and those of E3, at which all are shut.
+    let own = sound("--written|C4|--open-holes|R_VENT,R1 r2 R3 F_PAD E_PAD");
+    assert_eq!(own, sound("--written|C4"));
+    let shut = sound("--written|C4|--open-holes|");
+    assert_ne!(shut, own);
+    let hz = |wav: &[u8]| {
+        let samples = hound::WavReader::new(wav).unwrap().into_samples::<f32>();
+        let samples: Vec<f64> = samples.map(|sample| f64::from(sample.unwrap())).collect();
+        chalumeau_core::analysis::pitch::fundamental_hz(&samples[samples.len() / 2..], 48_000.0).unwrap()
+    };
+    // It keeps the tuning of C4.
+    let (found, e3) = (hz(&shut), 146.83);
+    assert!((found / e3 - 1.0).abs() < 0.03, "{found} Hz");
+    refused(&d, &format!("{render} --written C4 --open-holes R9 --out x.wav"), &["\"R9\"", "R_VENT"]);
+}
+
+#[test]
 fn a_take_blows_and_a_damaged_one_is_refused_by_line() {
     let d = tempfile::tempdir().unwrap();
     fs::write(d.path().join("take.csv"), "t_us,angle_deg\n0,0\n100000,180\n900000,180\n").unwrap();

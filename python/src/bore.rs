@@ -169,6 +169,7 @@ pub fn bifurcation<'py>(
     columns.set_item("gamma", PyArray1::from_iter(py, all().map(|point| point.gamma)))?;
     columns.set_item("rms", PyArray1::from_iter(py, all().map(|point| point.rms)))?;
     columns.set_item("shut", PyArray1::from_iter(py, all().map(|point| point.shut)))?;
+    columns.set_item("own", PyArray1::from_iter(py, all().map(|point| point.own)))?;
     columns.set_item("begins", changes.begins)?;
     columns.set_item("beats", changes.beats)?;
     columns.set_item("chokes", changes.chokes)?;

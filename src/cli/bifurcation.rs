@@ -25,8 +25,10 @@ Examples:
 ///
 /// Gamma (mouth pressure over closing pressure) runs from 0 to --to and back, --seconds each way. direction is 1 (rising)
 /// or -1 (falling), rms is the pressure in the mouthpiece over the closing pressure, shut is the fraction of time the reed
-/// is shut. Comments say where the note begins, beats, chokes, returns and ends. Up and down differ because a moving breath
-/// passes a threshold before the note has grown or died. A difference that remains with more --seconds is true hysteresis.
+/// is shut, own the share of power at the note's frequency, near 0 where another register sounds in its place. Comments say where the
+/// note begins, beats, chokes (or gives way to another register), returns and ends. Up and down differ because a moving breath
+/// passes a threshold before the note has grown or died. If the difference does not shrink with more --seconds, it is true
+/// hysteresis.
 ///
 /// The linear threshold among the comments is that of `chalumeau threshold`: the theory of a reed without inertia. As the reed has inertia,
 /// some high notes, such as C6, begin below it.
@@ -65,7 +67,7 @@ impl BifurcationCommand {
         let curve = BreathCurve::swell(self.to as f32, self.seconds);
         let settings = self.settings.blown_by(None, &curve, &file)?;
         let plot = self.plot.open(self.table.force())?;
-        let mut table = self.table.open_beside(&plot, "direction,gamma,rms,shut")?;
+        let mut table = self.table.open_beside(&plot, "direction,gamma,rms,shut,own")?;
         let threshold = linear_threshold(&file, written, &settings);
         let name = file.name.clone();
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
@@ -98,8 +100,8 @@ impl BifurcationCommand {
         for (direction, way) in [(1, &found.up), (-1, &found.down)] {
             for point in way {
                 table.line(format_args!(
-                    "{direction},{:.6},{:.6e},{:.4}",
-                    point.gamma, point.rms, point.shut
+                    "{direction},{:.6},{:.6e},{:.4},{:.4}",
+                    point.gamma, point.rms, point.shut, point.own
                 ))?;
             }
         }

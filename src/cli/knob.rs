@@ -297,6 +297,7 @@ impl KnobCommand {
         let mut take = None;
         // Positions from before the zero would be a breath that nobody blew.
         let mut is_zeroed = !self.zero;
+        let mut torque_mnm = None;
         // This thread obeys the user: what it prints is what the user sees. When it waits for its terminal, it beats no more.
         let heart = link.heartbeat("this program");
         let [stop, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
@@ -373,6 +374,7 @@ impl KnobCommand {
                 heard.try_iter().for_each(drop);
             }
             for state in heard.try_iter().filter(|_| is_zeroed) {
+                torque_mnm = state.torque_mnm;
                 let gamma = note.map.pressure_pa(f64::from(state.angle_deg)) / closing_pa;
                 if let (Some(take), true) = (&mut take, live_since.is_some()) {
                     write(take, &state, &note, gamma)?;
@@ -380,7 +382,7 @@ impl KnobCommand {
             }
             if shown.elapsed() >= SHOWN_EVERY {
                 shown = Instant::now();
-                show(&status, &note, closing_pa, &mut said);
+                show(&status, &note, closing_pa, torque_mnm, &mut said);
             }
             if let (Some(limit), Some(since)) = (self.seconds, live_since)
                 && since.elapsed().as_secs_f64() >= limit
@@ -477,7 +479,7 @@ fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) 
 }
 
 /// On a terminal one line that changes; elsewhere a line for each change of the link.
-fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, said: &mut String) {
+fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, torque_mnm: Option<f32>, said: &mut String) {
     let mut words = status.text.clone();
     for more in
         [&status.alarm, &status.restriction, &status.last_refusal, &status.notice].into_iter().flatten()
@@ -496,7 +498,11 @@ fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, said: &mut String
     if let (Some(angle), true) = (status.angle_deg, std::io::stderr().is_terminal()) {
         let angle = f64::from(angle);
         let gamma = note.map.pressure_pa(angle) / closing_pa;
-        let armed = if status.armed { "armed" } else { "not armed" };
+        let armed = match torque_mnm.filter(|_| status.armed) {
+            Some(torque_mnm) => format!("torque {torque_mnm:4.0} of {} mNm", status.ceiling_mnm),
+            None if status.armed => "armed".to_owned(),
+            None => "not armed".to_owned(),
+        };
         let _ = write!(
             std::io::stderr(),
             "\r\x1b[K{angle:8.1} degrees   gamma {gamma:.3}   threshold at {:.1}   {armed}",

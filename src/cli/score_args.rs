@@ -16,6 +16,7 @@ use crate::controllers::{ControllerMap, as_links};
 use crate::feel_flags;
 use crate::presets::{self, Preset};
 use crate::scale_file;
+use chalumeau_core::bore::fingering_finder;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
@@ -91,6 +92,10 @@ pub struct ScoreArgs {
     /// Slur the scale instead of tonguing each note
     #[arg(long, requires = "scale", conflicts_with_all = ["midi", "written", "sounding"])]
     slurred: bool,
+    /// Fingering of the note instead of the chart's: names of the open holes, as `fingerings` lists them, for example "REG L3 R3 E_PAD";
+    /// all others are shut, and "" shuts all. The tuning stays that of the note
+    #[arg(long, value_name = "HOLES", conflicts_with_all = ["midi", "scale"])]
+    open_holes: Option<String>,
     /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, with --replay the take's, with a longer --breath the
     /// breath's; scale 0.5]
     #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, NOTE_S.0, NOTE_S.1))]
@@ -140,6 +145,23 @@ fn interval(text: &str) -> Result<(u8, u8), String> {
 fn trim(text: &str) -> Result<(u8, f64), String> {
     let (name, cents) = text.split_once('=').ok_or("must be a note and its cents, for example E4=-12")?;
     Ok((note(name)?, within(cents, -TRIM_MOST_CENTS, TRIM_MOST_CENTS)?))
+}
+
+/// Which holes are open, by their names.
+fn open_holes(names: &str, file: &InstrumentFile) -> Result<Vec<bool>, Failure> {
+    let mut open = vec![false; file.holes.len()];
+    for name in names.split([' ', ',']).filter(|name| !name.is_empty()) {
+        let hole = file.holes.iter().position(|hole| hole.name.eq_ignore_ascii_case(name));
+        let Some(hole) = hole else {
+            let all: Vec<&str> = file.holes.iter().map(|hole| hole.name.as_str()).collect();
+            return Err(Failure::Usage(format!(
+                "--open-holes: this instrument has no hole {name:?}; its holes are {}",
+                all.join(" ")
+            )));
+        };
+        open[hole] = true;
+    }
+    Ok(open)
 }
 
 /// Reeds whose H and k differ by less are the same: takes have five decimals.
@@ -230,6 +252,11 @@ impl ScoreArgs {
         let note_s = take.as_ref().map_or(breath_s.max(USUAL_NOTE_S), Take::seconds);
         let (mut parts, unplayed) =
             self.score(&file, &map, keys.as_ref(), &mut settings, note_s, &mut warnings)?;
+        if let Some(names) = &self.open_holes {
+            let open = open_holes(names, &file)?;
+            let event = Event::TryHoles(Some(fingering_finder::bits(&open)));
+            parts.events.insert(0, Timed { at: 0, event: event.into() });
+        }
         warnings.extend(self.breath_left_over(breath_s, &parts));
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);

@@ -137,8 +137,8 @@ def bifurcation(
     """Plays a written note with breath that rises slowly from 0 to gamma ``to`` (0.2..3) in ``seconds`` (0.5..600), and falls.
 
     ``settings`` are those of the sound, as in `render` (see `parameters`). Returns arrays of equal length: ``direction`` (1 rising, -1 falling), ``gamma``, ``rms``
-    (pressure in the mouthpiece over the closing pressure) and ``shut`` (share of time in which the reed is shut); and the
-    gammas at which the note ``begins``, ``beats``, ``chokes``, ``returns``, ``opens`` and ``ends``, None where it does not.
+    (pressure in the mouthpiece over the closing pressure), ``shut`` (share of time in which the reed is shut) and ``own`` (share of
+    power at the note's frequency: near 0, another register sounds); and the gammas at which the note ``begins``, ``beats``, ``chokes``, ``returns``, ``opens`` and ``ends``, None where it does not.
 
     A moving breath passes a threshold before the note has grown or died (Bergeot, Almeida, Vergez and Gazengel, 2013), so
     these depend on ``seconds``. The same as ``chalumeau bifurcation``.

@@ -2,11 +2,12 @@
 //!
 //! Gamma, mouth pressure over closing pressure, runs in a straight line from 0 to a maximum and back. Each point covers a
 //! window of whole periods. It holds the rms of the pressure in the mouthpiece about its mean, over the closing pressure, and
-//! the share of time in which the reed is shut. The two ways differ where two states are stable. They also differ because a
+//! the share of time in which the reed is shut, and how much of the sound is the note. The two ways differ where two states are stable. They also differ because a
 //! moving ramp passes a threshold before the note has grown (Bergeot, Almeida, Vergez & Gazengel 2013); a slower ramp
 //! passes it by less.
 
 use crate::instrument::{BreathResponse, Clarinet, Model, Probe, Settings};
+use crate::maths;
 use crate::reed::motion::SHUT;
 use crate::score::breath::BreathCurve;
 use crate::score::{Score, play_probed};
@@ -20,6 +21,9 @@ pub const SOUNDING_RMS: f64 = 0.01;
 const STILL_S: f64 = 0.1;
 /// Shortest window, s.
 const WINDOW_S: f64 = 0.02;
+/// Of less power at its frequency than this share the sound is of another register. A note has half and more; one that is a semitone
+/// off, in the shortest window of the highest notes, a tenth.
+const OWN_SHARE: f64 = 0.05;
 
 /// One window of the ramp: a point of the diagram.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +34,15 @@ pub struct RampPoint {
     pub rms: f64,
     /// Share of time in which the reed is shut, 0..=1.
     pub shut: f64,
+    /// Share of the power of that pressure at the frequency of the note, 0..=1: near 0 where another register sounds.
+    pub own: f64,
+}
+
+impl RampPoint {
+    /// Whether the note sounds, and no other in its place.
+    pub fn sounds(&self) -> bool {
+        self.rms > SOUNDING_RMS && self.own > OWN_SHARE
+    }
 }
 
 /// The amplitude of a note along both ways of the ramp.
@@ -48,7 +61,7 @@ pub struct Transitions {
     pub begins: Option<f64>,
     /// Rising: the reed begins to shut for a part of each period while the note sounds (beating).
     pub beats: Option<f64>,
-    /// Rising: the note chokes, because the reed stays shut.
+    /// Rising: the note chokes, because the reed stays shut, or gives way to another register.
     pub chokes: Option<f64>,
     /// Falling: a choked note sounds again.
     pub returns: Option<f64>,
@@ -61,7 +74,7 @@ pub struct Transitions {
 impl BifurcationDiagram {
     /// The values of gamma at which the note begins, beats, chokes, returns, opens and ends.
     pub fn transitions(&self) -> Transitions {
-        let sounds = |point: &RampPoint| point.rms > SOUNDING_RMS;
+        let sounds = RampPoint::sounds;
         // What the tongue leaves behind fades; a note grows.
         let fading = self.up.windows(2).take_while(|pair| pair[1].rms < pair[0].rms).count();
         let begins = self.up.iter().skip(fading).position(sounds).map(|after| fading + after);
@@ -109,6 +122,7 @@ pub fn measure(
     let period = inner_hz / note.frequency_hz(f64::from(settings.a4_hz));
     let window = (period * (WINDOW_S * inner_hz / period).ceil()).round() as usize;
     let closing_pa = settings.closing_pa();
+    let turn = std::f64::consts::TAU / period;
     let half = (seconds * inner_hz) as usize;
     let mut still = (STILL_S * inner_hz).round() as usize;
     let mut found = BifurcationDiagram::default();
@@ -118,7 +132,7 @@ pub fn measure(
             still -= 1;
             return;
         }
-        inside.add(&probe, closing_pa);
+        inside.add(&probe, closing_pa, turn);
         seen += 1;
         if inside.count == window {
             let point = std::mem::take(&mut inside).point();
@@ -140,11 +154,20 @@ struct Window {
     sum: f64,
     squares: f64,
     shut: usize,
+    /// Sums of cosine and sine at the frequency of the note, and of the pressure with them.
+    wave: [f64; 2],
+    at_note: [f64; 2],
 }
 
 impl Window {
-    fn add(&mut self, probe: &Probe, closing_pa: f64) {
+    /// `turn` is the phase of the note from one sample to the next, radians.
+    fn add(&mut self, probe: &Probe, closing_pa: f64, turn: f64) {
         let p = probe.p_mouthpiece_pa / closing_pa;
+        let phase = turn * self.count as f64;
+        for (which, wave) in [maths::cos(phase), maths::sin(phase)].into_iter().enumerate() {
+            self.wave[which] += wave;
+            self.at_note[which] += p * wave;
+        }
         self.count += 1;
         self.gamma += probe.gamma;
         self.sum += p;
@@ -155,10 +178,14 @@ impl Window {
     fn point(self) -> RampPoint {
         let count = self.count.max(1) as f64;
         let mean = self.sum / count;
+        let power = (self.squares / count - mean * mean).max(0.0);
+        let part = |which: usize| 2.0 / count * (self.at_note[which] - mean * self.wave[which]);
+        let own = 0.5 * (part(0).powi(2) + part(1).powi(2));
         RampPoint {
             gamma: self.gamma / count,
-            rms: (self.squares / count - mean * mean).max(0.0).sqrt(),
+            rms: power.sqrt(),
             shut: self.shut as f64 / count,
+            own: if power > 0.0 { (own / power).min(1.0) } else { 0.0 },
         }
     }
 }
@@ -168,7 +195,7 @@ mod tests {
     use super::*;
 
     fn point(gamma: f64, rms: f64, shut: f64) -> RampPoint {
-        RampPoint { gamma, rms, shut }
+        RampPoint { gamma, rms, shut, own: 0.8 }
     }
 
     #[test]
@@ -192,6 +219,12 @@ mod tests {
         assert_eq!((changes.begins, changes.beats, changes.chokes), (Some(0.4), Some(0.5), Some(1.5)));
         assert_eq!((changes.returns, changes.opens, changes.ends), (Some(1.0), Some(0.45), Some(0.35)));
         assert_eq!(BifurcationDiagram::default().transitions(), Transitions::default());
+        // Another register in its place is not the note.
+        let mut other = found.clone();
+        other.up[3].own = 0.01;
+        other.down[1].own = 0.01;
+        let changes = other.transitions();
+        assert_eq!((changes.chokes, changes.returns), (Some(1.0), Some(0.45)));
         // The release of the tongue alone.
         let up = [0.04, 0.02, 0.005, 0.001].map(|rms| point(0.1, rms, 0.0)).to_vec();
         assert_eq!(BifurcationDiagram { up, down: Vec::new() }.transitions(), Transitions::default());
@@ -219,6 +252,8 @@ mod tests {
             slow.begins.unwrap() < begins && slow.ends.unwrap() > ends,
             "slower, less: {slow:?} {changes:?}"
         );
+        let is_own = |point: &RampPoint| point.rms < 0.1 || point.own > 0.4;
+        assert!(found.up.iter().chain(&found.down).all(is_own), "the fundamental is the strongest");
         let top = found.up.last().unwrap();
         assert!((0.7..=0.8).contains(&top.gamma) && top.rms > 0.4, "{top:?}");
     }
