@@ -103,20 +103,6 @@ pub fn render<'py>(
     Ok(dict)
 }
 
-/// What the user should know of a sounding note that is played with these settings: that it stays silent.
-#[pyfunction]
-pub fn silent(
-    py: Python<'_>,
-    pairs: Vec<(String, String)>,
-    instrument: &Instrument,
-    note: u8,
-) -> PyResult<Vec<String>> {
-    let given = Given::Notes(vec![timed((0.0, 0.1, note, 0.8))?]);
-    let file = instrument.file.clone();
-    py.detach(|| watched(|stop| offline::render_job(&pairs, Some(file), Some(given), Some(stop))))
-        .map(|job| job.warnings)
-}
-
 fn timed((from_s, seconds, note, velocity): ListedNote) -> PyResult<TimedNote> {
     let fits = |seconds: f64| (0.0..=LONGEST_S).contains(&seconds);
     if !fits(from_s) || !fits(seconds) {

@@ -68,6 +68,14 @@ impl Voice {
         self.apply(py, Event::NoteOn { note: SoundingNote(note), velocity });
     }
 
+    /// What the user should know of a key: that it stays silent.
+    fn silent(&self, py: Python<'_>, note: u8) -> Vec<String> {
+        py.detach(|| {
+            let clarinet = self.lock();
+            offline::silent(SoundingNote(note), clarinet.model(), clarinet.settings())
+        })
+    }
+
     fn note_off(&self, py: Python<'_>, note: u8) {
         self.apply(py, Event::NoteOff { note: SoundingNote(note) });
     }
@@ -101,8 +109,8 @@ impl Voice {
     /// The next samples, in a new array.
     fn render<'py>(&self, py: Python<'py>, samples: usize) -> PyResult<Bound<'py, PyArray1<f32>>> {
         // Two hours at the highest rate would not fit into memory either.
-        const MOST: usize = 1 << 32;
-        if samples > MOST {
+        const MOST: u64 = 1 << 32;
+        if samples as u64 > MOST {
             return Err(wrong(format_args!(
                 "at most {MOST} samples at once, got {samples}; render in parts"
             )));

@@ -10,7 +10,7 @@ use crate::identity::VERSION;
 use crate::output::{NewFile, OutputError, remove_unfinished_and_exit};
 use crate::take_file::TakeFile;
 use chalumeau_core::control::knob::KnobDesign;
-use chalumeau_core::haptics::{FeelDesign, FeelRefused, NoteFeel, TorqueLimits};
+use chalumeau_core::haptics::{FeelDesign, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::{
@@ -123,25 +123,14 @@ impl WantedFeel {
     /// The feel of the note, and its design, weakened as far as the limits ask for and the user allows: as far as the hardest note
     /// of the chart needs, so that the notes of several commands can be compared.
     fn under(&self, limits: &TorqueLimits) -> Result<(NoteFeel, FeelDesign), Failure> {
-        let mut design = self.design;
-        loop {
-            let table = self.feels.table(&self.settings, &design, &NO_MOTOR)?;
-            let is_too_strong = |refused: &FeelRefused| matches!(refused, FeelRefused::Ceiling { .. });
-            let hardest = self.feels.table(&self.settings, &design, limits).err();
-            let own = table.accepts(self.fingering, &design, limits).err();
-            match hardest.filter(is_too_strong).filter(|_| self.may_weaken).or(own) {
-                None => {
-                    let note = table.note(self.fingering).copied().unwrap_or(*table.reference());
-                    return Ok((note, design));
-                }
-                Some(FeelRefused::Ceiling { strength_mnm, .. })
-                    if self.may_weaken && strength_mnm < design.strength_mnm && strength_mnm > 0.0 =>
-                {
-                    design.strength_mnm = strength_mnm;
-                }
-                Some(refused) => return Err(refused_in_flags(refused, "--arm")),
-            }
-        }
+        let ceiling_mnm = if self.may_weaken { limits.ceiling_mnm } else { f64::INFINITY };
+        let hardest = TorqueLimits { ceiling_mnm, ..NO_MOTOR };
+        let refused = |refused| refused_in_flags(refused, "--arm");
+        let (table, design) =
+            self.feels.strongest(&self.settings, &self.design, &hardest).map_err(refused)?;
+        // All other limits are this note's alone: the knob gets no other.
+        table.accepts(self.fingering, &design, limits).map_err(refused)?;
+        Ok((table.note(self.fingering).copied().unwrap_or(*table.reference()), design))
     }
 }
 

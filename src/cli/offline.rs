@@ -9,12 +9,13 @@ use crate::cli::haptic::{FeltReedArgs, ReedInAirArgs};
 use crate::cli::parse;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, rate, sounding};
+use crate::cli::silent_keys::silent_keys;
 use crate::cli::words::Names;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelTable, PlayedReed, RequirementSolver};
-use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::score::breath::BreathCurve;
-use chalumeau_core::units::WrittenNote;
+use chalumeau_core::units::{SoundingNote, WrittenNote};
 use clap::{Args, Parser};
 use std::path::Path;
 
@@ -142,6 +143,11 @@ pub fn blown(
 pub fn settings(pairs: &Pairs, instrument: &InstrumentFile) -> Result<Settings, String> {
     let args: LiveArgs = read(pairs)?;
     args.settings.played(instrument).map_err(|failure| failure.to_string())
+}
+
+/// What the user should know of a key that is struck on this instrument: that it stays silent.
+pub fn silent(key: SoundingNote, model: &Model, settings: &Settings) -> Vec<String> {
+    silent_keys(&[key], model, settings.reach)
 }
 
 /// The feel of every note, as `chalumeau haptic` has it. Takes a second.

@@ -79,6 +79,10 @@ impl BreathView {
         if snapshot.sources.is_empty() {
             ui.label("No source has sent a value yet. Key velocity sets the mouth pressure.");
         }
+        // Under the meters, where the hand that has just plugged in a controller looks; not below all that it may turn later.
+        if hands.step("resp") == PLAYED {
+            self.calibrate_breath(ui, hands, snapshot);
+        }
         if may_calibrate {
             heading(ui, "Calibrate the knob");
             calibrate(ui, hands);
@@ -97,9 +101,6 @@ impl BreathView {
         if let Some(of) = OfSource::live(hands, snapshot).filter(OfSource::is_own) {
             let said = format!("{} has its own curve, in the picture.", of.title());
             ui.label(egui::RichText::new(said).font(theme::small()).color(c.quiet));
-        }
-        if hands.step("resp") == PLAYED {
-            self.calibrate_breath(ui, hands, snapshot);
         }
         for id in ["bsoft", "bloud", "bdead", "full", "curve"] {
             slider(ui, hands, id);

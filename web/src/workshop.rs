@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::{InstrumentError, InstrumentFile};
 use chalumeau_core::bore::moved_hole::MovedHole;
-use chalumeau_core::haptics::{FeelDesign, FeelRefused, TorqueLimits};
+use chalumeau_core::haptics::{FeelDesign, TorqueLimits};
 use chalumeau_core::instrument::prepare::{PreparedInstrument, altered};
 use chalumeau_core::instrument::{Model, Preparation, Settings, Wanted};
 use chalumeau_knob::touch::feel::InstrumentFeel;
@@ -138,15 +138,9 @@ impl Bench {
             stiffness_nm_per_rad: number("stiffness"),
             push_nm_per_rad: number("push"),
         };
-        let table = feels.table(&settings, &FeelDesign::default(), &limits);
-        let table = match table {
-            // A knob that allows less than the usual feel gets the strongest that it allows.
-            Err(FeelRefused::Ceiling { strength_mnm, .. }) if strength_mnm > 0.0 => {
-                feels.table(&settings, &FeelDesign { strength_mnm, ..FeelDesign::default() }, &limits)
-            }
-            table => table,
-        };
-        let table = table.map_err(|refused| refused.to_string())?;
+        // A knob that allows less than the usual feel gets the strongest that it allows.
+        let weakened = feels.strongest(&settings, &FeelDesign::default(), &limits);
+        let (table, _) = weakened.map_err(|refused| refused.to_string())?;
         Ok(feels.played(&table, &settings).to_bytes())
     }
 }

@@ -255,9 +255,7 @@ class Clarinet:
         self._instrument = instrument_of(instrument)
         _refuse_idle(settings, named)
         self._settings: dict[str, Value] = {**(settings or {}), **named}
-        self._rate = {"rate": rate}
-        self._voice = _native.Voice(pairs(self._settings, self._rate), self._instrument)
-        self._silent: dict[int, list[str]] = {}
+        self._voice = _native.Voice(pairs(self._settings, {"rate": rate}), self._instrument)
 
     @property
     def rate(self) -> int:
@@ -297,15 +295,12 @@ class Clarinet:
         wanted = _changed(self._settings, settings, **named)
         self._voice.set(pairs(wanted), self._instrument)
         self._settings = wanted
-        self._silent.clear()
 
     def note_on(self, key: NoteLike, velocity: float = 0.8) -> None:
         """A key or fingering goes down: sounding pitch, velocity 0..1. Beside a held key it is slurred."""
         pitch = note(key)
         self._voice.note_on(pitch, _velocity(velocity))
-        if pitch not in self._silent:
-            self._silent[pitch] = _native.silent(pairs(self._settings, self._rate), self._instrument, pitch)
-        for warning in self._silent[pitch]:
+        for warning in self._voice.silent(pitch):
             warnings.warn(warning, stacklevel=2)
 
     def note_off(self, key: NoteLike) -> None:

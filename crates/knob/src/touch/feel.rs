@@ -75,6 +75,28 @@ impl InstrumentFeel {
         FeelTable::new(&self.requirements, design, &self.reed(settings), limits)
     }
 
+    /// The same, weakened as far as the ceiling asks for: the table, and the design whose strength it has. Another limit still refuses
+    /// it, and so does a ceiling that leaves nothing beside mark and friction. Allocates; takes up to 0.2 s.
+    pub fn strongest(
+        &self,
+        settings: &Settings,
+        design: &FeelDesign,
+        limits: &TorqueLimits,
+    ) -> Result<(FeelTable, FeelDesign), FeelRefused> {
+        let mut design = *design;
+        loop {
+            match self.table(settings, &design, limits) {
+                Ok(table) => return Ok((table, design)),
+                Err(FeelRefused::Ceiling { strength_mnm, .. })
+                    if strength_mnm > 0.0 && strength_mnm < design.strength_mnm =>
+                {
+                    design.strength_mnm = strength_mnm;
+                }
+                Err(refused) => return Err(refused),
+            }
+        }
+    }
+
     /// Index of the fingering for a sounding pitch. Real-time safe.
     pub fn fingering(&self, note: SoundingNote) -> Option<usize> {
         self.fingerings.get(usize::from(note.0)).copied().flatten().map(usize::from)
@@ -222,6 +244,22 @@ impl PitchMaps {
 mod tests {
     use super::*;
     use chalumeau_core::haptics::TorqueLimits;
+
+    #[test]
+    fn a_weakened_feel_is_the_strongest_that_the_ceiling_allows() {
+        let feels = InstrumentFeel::built_in().unwrap();
+        let (settings, design) = (Settings::default(), FeelDesign::default());
+        let under = |ceiling_mnm: f64| {
+            feels.strongest(&settings, &design, &TorqueLimits { ceiling_mnm, ..TorqueLimits::default() })
+        };
+        assert_eq!(under(100.0).unwrap().1, design);
+        let (_, weak) = under(40.0).unwrap();
+        assert!(weak.strength_mnm < design.strength_mnm, "{weak:?}");
+        let more = FeelDesign { strength_mnm: weak.strength_mnm + 2.0, ..weak };
+        let limits = TorqueLimits { ceiling_mnm: 40.0, ..TorqueLimits::default() };
+        assert!(matches!(feels.table(&settings, &more, &limits), Err(FeelRefused::Ceiling { .. })));
+        assert!(matches!(under(10.0), Err(FeelRefused::Ceiling { .. })), "mark and friction alone");
+    }
 
     #[test]
     fn bytes_give_the_same_feel_and_nothing_else_does() {
