@@ -1,30 +1,30 @@
 //! A knob's feel as flags of the command line, as takes and tables keep it.
 
 use chalumeau_core::haptics::{FeelDesign, NoteOrder};
+use chalumeau_core::units::{WrittenNote, midi_of_name};
 use chalumeau_knob::wire::message::TorqueLaw;
 
-/// What stands in a take before the flags of the feel it was recorded with.
-const FEEL: &str = "feel ";
+/// Laws as flags and figures name them.
+const LAWS: [(TorqueLaw, &str); 3] =
+    [(TorqueLaw::Flow, "flow"), (TorqueLaw::Pressure, "pressure"), (TorqueLaw::Free, "free")];
+/// Orders as flags name them.
+const ORDERS: [(NoteOrder, &str); 3] = [
+    (NoteOrder::Physical, "physical"),
+    (NoteOrder::CoveredHoles, "covered-holes"),
+    (NoteOrder::CoveredHolesReversed, "covered-holes-reversed"),
+];
 
-/// These flags change the torque alone.
-const OF_THE_TORQUE: [&str; 3] = ["contrast ", "torque ", "detent "];
+fn name_in<T: PartialEq>(all: &[(T, &'static str)], one: &T) -> &'static str {
+    all.iter().find(|(each, _)| each == one).map_or("", |(_, name)| name)
+}
+
+fn named_in<T: Copy>(all: &[(T, &str)], name: &str) -> Option<T> {
+    all.iter().find(|(_, each)| *each == name).map(|(one, _)| *one)
+}
 
 /// A law as flags and figures name it.
 pub fn law_name(law: TorqueLaw) -> &'static str {
-    match law {
-        TorqueLaw::Flow => "flow",
-        TorqueLaw::Pressure => "pressure",
-        TorqueLaw::Free => "free",
-    }
-}
-
-/// An order as flags name it.
-fn order_name(order: NoteOrder) -> &'static str {
-    match order {
-        NoteOrder::Physical => "physical",
-        NoteOrder::CoveredHoles => "covered-holes",
-        NoteOrder::CoveredHolesReversed => "covered-holes-reversed",
-    }
+    name_in(&LAWS, &law)
 }
 
 /// This feel as flags.
@@ -41,7 +41,7 @@ pub fn in_flags(design: &FeelDesign) -> String {
         law_name(law),
         number(design.contrast),
         number(design.place),
-        order_name(design.order),
+        name_in(&ORDERS, &design.order),
         number(torque_mnm),
         number(design.travel_deg),
         number(design.mark_mnm()),
@@ -55,24 +55,42 @@ pub fn in_flags(design: &FeelDesign) -> String {
     flags
 }
 
-/// A remark for a take: the feel it is recorded with.
-pub fn remark(design: &FeelDesign) -> String {
-    format!("{FEEL}{}", in_flags(design))
+/// Reads flags as [`in_flags`] writes them; those that are missing are at their defaults. The error says which one is wrong.
+pub fn read(flags: &str) -> Result<FeelDesign, String> {
+    let mut design = FeelDesign::default();
+    let mut words = flags.split_whitespace();
+    while let Some(flag) = words.next() {
+        if flag == "--equal-travel" {
+            design.equal_travel = true;
+            continue;
+        }
+        let value = words.next().unwrap_or_default();
+        let wrong = || format!("{flag} {value} is none of its flags");
+        let number = || value.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(wrong);
+        match flag {
+            "--law" => design.law = named_in(&LAWS, value).ok_or_else(wrong)?,
+            "--order" => design.order = named_in(&ORDERS, value).ok_or_else(wrong)?,
+            "--contrast" => design.contrast = number()?,
+            "--place" => design.place = number()?,
+            "--torque" => design.strength_mnm = number()?,
+            "--travel" => design.travel_deg = number()?,
+            "--detent" => design.detent_mnm = Some(number()?),
+            "--reference" => {
+                let midi = value.parse().ok().or_else(|| midi_of_name(value));
+                design.reference = Some(WrittenNote(midi.ok_or_else(wrong)?));
+            }
+            _ => return Err(wrong()),
+        }
+    }
+    Ok(design)
 }
 
-/// The flags in a line of a take, if it is that [`remark`].
-pub fn in_remark(line: &str) -> Option<&str> {
-    line.strip_prefix('#')?.trim_start().strip_prefix(FEEL)
-}
-
-/// Whether these flags turn angles into pressures as this feel does.
-pub fn map_alike(flags: &str, design: &FeelDesign) -> bool {
-    let is_of_torque = |flag: &str| OF_THE_TORQUE.iter().any(|name| flag.starts_with(name));
-    let of_the_map = |flags: &str| -> Vec<String> {
-        let flags = flags.split("--").map(str::trim).filter(|flag| !is_of_torque(flag));
-        flags.map(str::to_owned).collect()
+/// Whether two feels turn angles into the same pressures: what changes the torque alone does not matter.
+pub fn map_alike(a: &FeelDesign, b: &FeelDesign) -> bool {
+    let of_the_map = |design: &FeelDesign| {
+        (design.law, design.place, design.equal_travel, design.order, design.reference, design.travel_deg)
     };
-    of_the_map(flags) == of_the_map(&in_flags(design))
+    of_the_map(a) == of_the_map(b)
 }
 
 #[cfg(test)]
@@ -82,14 +100,13 @@ mod tests {
     #[test]
     fn only_what_moves_a_pressure_makes_another_map() {
         let usual = FeelDesign::default();
-        let remark = format!("# {}", remark(&usual));
-        let flags = in_remark(&remark).unwrap();
         for alike in [
             usual,
             FeelDesign { contrast: 5.0, ..usual },
             FeelDesign { strength_mnm: 20.0, detent_mnm: Some(0.0), ..usual },
+            read("--law flow --place 1.0").unwrap(),
         ] {
-            assert!(map_alike(flags, &alike), "{alike:?}");
+            assert!(map_alike(&usual, &alike), "{alike:?}");
         }
         for other in [
             FeelDesign { law: TorqueLaw::Pressure, ..usual },
@@ -97,9 +114,25 @@ mod tests {
             FeelDesign { travel_deg: 300.0, ..usual },
             FeelDesign { equal_travel: true, ..usual },
         ] {
-            assert!(!map_alike(flags, &other), "{other:?}");
+            assert!(!map_alike(&usual, &other), "{other:?}");
         }
-        assert_eq!(in_remark("# C4 (written 60) of B flat clarinet"), None);
+    }
+
+    #[test]
+    fn a_feel_as_flags_is_that_feel() {
+        let usual = "--law flow --contrast 3 --place 1 --order physical --torque 55 --travel 360 --detent 9";
+        assert_eq!(in_flags(&FeelDesign::default()), usual);
+        for flags in [
+            usual,
+            "--law pressure --contrast 2.3 --place 5 --order covered-holes --torque 260 --travel 120 --detent 0 --reference A#4",
+            "--law flow --contrast 1 --place 1 --order covered-holes-reversed --torque 0 --travel 360.5 --detent 9 --equal-travel",
+        ] {
+            assert_eq!(in_flags(&read(flags).unwrap()), flags);
+        }
+        for wrong in ["--loudness 3", "--place far", "out.wav", "--law"] {
+            let said = read(wrong).unwrap_err();
+            assert!(said.starts_with(wrong), "{said}");
+        }
     }
 
     #[test]

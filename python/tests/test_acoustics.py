@@ -59,8 +59,8 @@ def test_feel_and_torque_are_those_of_the_command_line(table):
 
 
 def test_bifurcation_is_that_of_the_command_line(table):
-    said = table("bifurcation", "--written", "F3", "--to", "1", "--seconds", "1", "--zeta", "0.4")
-    ramp = chalumeau.bifurcation("F3", to=1, seconds=1, zeta=0.4)
+    said = table("bifurcation", "--written", "F3", "--to", "1", "--seconds", "4", "--zeta", "0.4")
+    ramp = chalumeau.bifurcation("F3", to=1, seconds=4, zeta=0.4)
     assert list(ramp["direction"]) == said["direction"]
     np.testing.assert_allclose(ramp["gamma"], said["gamma"], atol=1e-6)
     np.testing.assert_allclose(ramp["rms"], said["rms"], rtol=1e-6, atol=1e-12)

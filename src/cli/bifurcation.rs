@@ -97,6 +97,12 @@ impl BifurcationCommand {
         table.comment(format_args!("{name}; written {written}; {note}"))?;
         let changes = found.transitions();
         table.comment(format_args!("gamma: {}", changes_in_words(threshold, &changes, self.to)))?;
+        if let Some((way, gamma)) = found.other_register() {
+            let way = if way > 0 { "rising" } else { "falling" };
+            say!(
+                "warning: another register than that of {written} sounds, first at gamma {gamma:.2} ({way}): a ramp that is slower, --seconds, keeps more notes"
+            );
+        }
         for (direction, way) in [(1, &found.up), (-1, &found.down)] {
             for point in way {
                 table.line(format_args!(

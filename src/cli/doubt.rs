@@ -63,7 +63,7 @@ impl Doubt {
             Self::Limited => "the limiter turned peaks down; lower gain-db for levels as played",
             Self::Reset => "the calculation broke down and the instrument was reset; please report this",
             Self::NoTone => {
-                "after 0.5 s there is no tone: the breath is too weak for the note, or so strong that the reed stays shut, or the key is silent"
+                "no tone is heard, or none after 0.5 s: the breath is too weak for the note, or so strong that the reed stays shut, or the key is silent"
             }
         }
     }

@@ -6,7 +6,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, NoteOrder};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::wire::message::TorqueLaw;
-use clap::{Args, Parser, ValueEnum};
+use clap::{Args, ValueEnum};
 
 fn inside(text: &str, (low, high): (f64, f64)) -> Result<f64, String> {
     within(text, low, high)
@@ -65,64 +65,37 @@ pub struct FeelArgs {
     detent: Option<f64>,
 }
 
-/// The flags of the feel alone, as a take has them.
-#[derive(Parser)]
-#[command(no_binary_name = true, disable_help_flag = true)]
-struct RecordedFlags {
-    #[command(flatten)]
-    feel: FeelArgs,
-}
-
 impl FeelArgs {
-    /// Reads flags that a take has kept. The error says what is wrong with them.
-    pub fn recorded(flags: &str) -> Result<Self, String> {
-        let read = RecordedFlags::try_parse_from(flags.split_whitespace());
-        read.map(|read| read.feel).map_err(|error| {
-            let text = error.to_string();
-            let first = text.lines().next().unwrap_or_default();
-            first.trim_start_matches("error: ").to_owned()
-        })
-    }
-
-    /// These flags, and those of `recorded` where one is missing.
-    pub fn or(&self, recorded: Self) -> Self {
-        Self {
-            law: self.law.or(recorded.law),
-            contrast: self.contrast.or(recorded.contrast),
-            place: self.place.or(recorded.place),
-            equal_travel: self.equal_travel || recorded.equal_travel,
-            order: self.order.or(recorded.order),
-            reference: self.reference.or(recorded.reference),
-            torque: self.torque.or(recorded.torque),
-            travel: self.travel.or(recorded.travel),
-            detent: self.detent.or(recorded.detent),
-        }
-    }
-
     /// The feel these arguments describe, on this instrument.
     pub fn design(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
+        self.over(&FeelDesign::default(), file)
+    }
+
+    /// The same where another feel stands in place of the defaults.
+    pub fn over(&self, base: &FeelDesign, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
         if let Some(reference) = self.reference {
             check_fingering(file, WrittenNote(reference))?;
         }
-        let usual = FeelDesign::default();
+        let law = self.law.map_or(base.law, |law| match law {
+            LawArg::Flow => TorqueLaw::Flow,
+            LawArg::Pressure => TorqueLaw::Pressure,
+        });
         Ok(FeelDesign {
-            law: match self.law.unwrap_or(LawArg::Flow) {
-                LawArg::Flow => TorqueLaw::Flow,
-                LawArg::Pressure => TorqueLaw::Pressure,
-            },
-            reference: self.reference.map(WrittenNote),
-            contrast: self.contrast(),
-            place: self.place(),
-            equal_travel: self.equal_travel,
-            order: match self.order.unwrap_or(OrderArg::Physical) {
+            law,
+            reference: self.reference.map(WrittenNote).or(base.reference),
+            contrast: self.contrast.unwrap_or(base.contrast),
+            place: self.place.unwrap_or(base.place),
+            equal_travel: self.equal_travel || base.equal_travel,
+            order: self.order.map_or(base.order, |order| match order {
                 OrderArg::Physical => NoteOrder::Physical,
                 OrderArg::CoveredHoles => NoteOrder::CoveredHoles,
                 OrderArg::CoveredHolesReversed => NoteOrder::CoveredHolesReversed,
-            },
-            strength_mnm: self.torque.unwrap_or(usual.strength_mnm),
-            travel_deg: self.travel.unwrap_or(usual.travel_deg),
-            detent_mnm: self.detent,
-            ..usual
+            }),
+            strength_mnm: self.torque.unwrap_or(base.strength_mnm),
+            travel_deg: self.travel.unwrap_or(base.travel_deg),
+            // Each law has a mark of its own.
+            detent_mnm: self.detent.or(base.detent_mnm.filter(|_| law == base.law)),
+            ..*base
         })
     }
 
@@ -190,30 +163,34 @@ pub fn refused_in_flags(refused: FeelRefused, ceiling: &str) -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::feel_flags::in_flags;
+    use crate::feel_flags;
+
+    #[derive(clap::Parser)]
+    struct Flags {
+        #[command(flatten)]
+        feel: FeelArgs,
+    }
 
     #[test]
-    fn a_feel_as_flags_is_that_feel() {
+    fn flags_are_those_that_takes_keep_and_replace_them() {
         let file = InstrumentFile::built_in();
-        let usual = "--law flow --contrast 3 --place 1 --order physical --torque 55 --travel 360 --detent 9";
-        assert_eq!(in_flags(&FeelDesign::default()), usual);
+        let given = |flags: &str| {
+            let words = std::iter::once("feel").chain(flags.split_whitespace());
+            <Flags as clap::Parser>::parse_from(words).feel
+        };
         for flags in [
-            usual,
-            "--law pressure --contrast 2.3 --place 5 --order covered-holes --torque 260 --travel 120 --detent 0 --reference Bb4",
-            "--law flow --contrast 1 --place 1 --order covered-holes-reversed --torque 0 --travel 360.5 --detent 9 --equal-travel",
+            feel_flags::in_flags(&FeelDesign::default()),
+            "--law pressure --contrast 2.3 --place 5 --order covered-holes --torque 260 --travel 120 --detent 0 --reference A#4"
+                .to_owned(),
         ] {
-            let design = FeelArgs::recorded(flags).unwrap().design(&file).ok().unwrap();
-            assert_eq!(in_flags(&design), flags.replace("Bb4", "A#4"));
+            let design = given(&flags).design(&file).ok().unwrap();
+            assert_eq!(feel_flags::in_flags(&design), flags);
         }
-        let given = FeelArgs::recorded("--place 2 --reference E3").unwrap();
-        let both = given.or(FeelArgs::recorded("--place 5 --law pressure").unwrap());
-        let design = both.design(&file).ok().unwrap();
+        let base = feel_flags::read("--law pressure --place 5 --detent 2").unwrap();
+        let design = given("--place 2 --reference E3").over(&base, &file).ok().unwrap();
         assert_eq!((design.place, design.law), (2.0, TorqueLaw::Pressure));
-        assert_eq!(design.reference, Some(WrittenNote(52)));
-        for wrong in ["--loudness 3", "--place far", "out.wav"] {
-            let said = FeelArgs::recorded(wrong).err().unwrap();
-            assert!(said.contains(wrong.rsplit(' ').next_back().unwrap()), "{said}");
-        }
+        assert_eq!((design.reference, design.mark_mnm()), (Some(WrittenNote(52)), 2.0));
+        assert_eq!(given("--law flow").over(&base, &file).ok().unwrap().mark_mnm(), 9.0);
     }
 
     #[test]

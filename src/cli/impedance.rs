@@ -230,7 +230,7 @@ impl ImpedanceCommand {
             let apart: Vec<(f64, f64)> = shown
                 .iter()
                 .filter_map(|a| {
-                    let b = partner(a, &theirs)?;
+                    let b = partner(a, &modes, &theirs)?;
                     Some((cents(a.f_hz, b.f_hz).abs(), 20.0 * (a.mag_over_zc / b.mag_over_zc).log10().abs()))
                 })
                 .collect();
@@ -307,11 +307,17 @@ const MORE: usize = 3;
 /// Peaks of two models that are farther apart are not the same one, cents: a hump that is double in one model is single in the other.
 const PARTNERS_CENTS: f64 = 50.0;
 
-/// The peak of another model that is this one.
-fn partner<'a>(peak: &Peak, theirs: &'a [Peak]) -> Option<&'a Peak> {
-    let apart = |other: &&Peak| cents(peak.f_hz, other.f_hz).abs();
-    let nearest = theirs.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
-    (apart(&nearest) <= PARTNERS_CENTS).then_some(nearest)
+/// The peak of another model that is this one: each is the nearest to the other.
+fn partner<'a>(peak: &Peak, ours: &[Peak], theirs: &'a [Peak]) -> Option<&'a Peak> {
+    let nearest = nearest(peak.f_hz, theirs)?;
+    let is_mutual = self::nearest(nearest.f_hz, ours).is_some_and(|back| back.f_hz == peak.f_hz);
+    (is_mutual && cents(peak.f_hz, nearest.f_hz).abs() <= PARTNERS_CENTS).then_some(nearest)
+}
+
+/// The peak nearest to a frequency, by interval.
+fn nearest(f_hz: f64, peaks: &[Peak]) -> Option<&Peak> {
+    let apart = |peak: &Peak| cents(peak.f_hz, f_hz).abs();
+    peaks.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
 }
 
 enum Bore {
@@ -359,4 +365,20 @@ fn lattice(model: &instrument::Model, f_hz: f64, open: &[bool]) -> Complex64 {
 fn beside_reed(z: Complex64, f_hz: f64, volume_m3: f64, z_c: f64, air: &Air) -> Complex64 {
     let compliance = volume_m3 / (air.rho * air.c * air.c);
     z / (1.0 + z * Complex64::I * TAU * f_hz * compliance * z_c)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_double_hump_has_one_partner() {
+        let peaks = |all: &[f64]| -> Vec<Peak> {
+            all.iter().map(|&f_hz| Peak { f_hz, mag_over_zc: 1.0, q: 10.0 }).collect()
+        };
+        let (ours, theirs) = (peaks(&[500.0, 1200.0, 1215.0, 1600.0]), peaks(&[501.0, 1210.0, 1700.0]));
+        let found: Vec<_> =
+            ours.iter().map(|peak| partner(peak, &ours, &theirs).map(|peak| peak.f_hz)).collect();
+        assert_eq!(found, [Some(501.0), None, Some(1210.0), None]);
+    }
 }

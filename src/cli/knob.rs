@@ -9,6 +9,7 @@ use crate::feel_flags;
 use crate::identity::VERSION;
 use crate::output::{NewFile, OutputError, remove_unfinished_and_exit};
 use crate::take_file::TakeFile;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::haptics::{FeelDesign, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
@@ -18,8 +19,8 @@ use chalumeau_knob::device::{
     OFFERED_CEILING_MNM, Phase, Release, StateSample, serial_text,
 };
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
-use chalumeau_knob::touch::take::{TakeHand, TakeMarks, TakeRow};
-use chalumeau_knob::touch::take_csv::instrument_remark;
+use chalumeau_knob::touch::take::{TakeEmbouchure, TakeHand, TakeHead, TakeMarks, TakeRow};
+use chalumeau_knob::wire::Info;
 use clap::{ArgGroup, Args};
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
@@ -150,7 +151,6 @@ impl KnobCommand {
         let (note, _) = wanted.under(&TorqueLimits { ceiling_mnm, ..TorqueLimits::default() })?;
         self.ask_again()?;
         let take = self.record.as_ref().map(|path| NewFile::create(path, self.force)).transpose()?;
-        let fingered = format!("{written} (written {})", written.0);
 
         let (rows, heard) = channel();
         // None until the knob has told its limits.
@@ -165,35 +165,7 @@ impl KnobCommand {
         let (link, _reader) = KnobLink::spawn("chalumeau knob", hooks);
         link.choose(self.choice());
         let settle = |status: &LinkStatus| {
-            let remarks = |design: &FeelDesign| {
-                let usual = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
-                let hand = TakeHand { design: usual, feels: true };
-                let knob = status.info.map_or_else(
-                    || "a knob that does not say what torque it makes".to_owned(),
-                    |info| {
-                        let (major, minor, patch) = info.firmware;
-                        let serial = serial_text(info.serial);
-                        let freely = match self.arm {
-                            Some(mnm) => format!("armed with at most {mnm} mNm"),
-                            None => "never armed: it turned freely".to_owned(),
-                        };
-                        format!(
-                            "{}, serial number {serial}, firmware {major}.{minor}.{patch}, {freely}",
-                            info.name_text()
-                        )
-                    },
-                );
-                vec![
-                    format!(
-                        "Chalumeau {VERSION} take; t_us counts from the start of the link, angle from the knob's zero"
-                    ),
-                    fingered.clone(),
-                    instrument_remark(&file.name),
-                    feel_flags::remark(design),
-                    hand.remark(),
-                    knob,
-                ]
-            };
+            let remarks = |design: &FeelDesign| self.remarks(written, &file, design, status.info.as_ref());
             let as_asked = || Settled { note, remarks: remarks(&wanted.design) };
             let Some(info) = &status.info else { return Ok(as_asked()) };
             let limits = info.torque_limits(ceiling_mnm.round() as u16);
@@ -218,6 +190,49 @@ impl KnobCommand {
             Ok(Settled { note, remarks })
         };
         self.watch(&link, &heard, note, &settle, take)
+    }
+
+    /// What a take says above its columns.
+    fn remarks(
+        &self,
+        written: WrittenNote,
+        file: &InstrumentFile,
+        design: &FeelDesign,
+        knob: Option<&Info>,
+    ) -> Vec<String> {
+        let usual = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
+        let knob = match knob {
+            None => "a knob that does not say what torque it makes".to_owned(),
+            Some(info) => {
+                let ((major, minor, patch), serial) = (info.firmware, serial_text(info.serial));
+                let armed = match self.arm {
+                    Some(mnm) => format!("may be armed with at most {mnm} mNm"),
+                    None => "never armed: it turned freely".to_owned(),
+                };
+                let name = info.name_text();
+                format!("{name}, serial number {serial}, firmware {major}.{minor}.{patch}, {armed}")
+            }
+        };
+        let settings = self.reed.settings();
+        let head = TakeHead {
+            instrument: Some(file.name.clone()),
+            feel: Some(feel_flags::in_flags(design)),
+            hand: Some(TakeHand { design: usual, feels: true }),
+            embouchure: Some(TakeEmbouchure {
+                zeta: settings.zeta,
+                strength: settings.strength,
+                lip: settings.lip,
+            }),
+        };
+        let mut remarks = vec![
+            format!(
+                "Chalumeau {VERSION} take; t_us counts from the start of the link, angle from the knob's zero"
+            ),
+            format!("{written} (written {})", written.0),
+            knob,
+        ];
+        remarks.extend(head.remarks());
+        remarks
     }
 
     /// The further act that more than the usual ceiling needs.
@@ -263,6 +278,26 @@ impl KnobCommand {
             Some(mnm) => link.arm(mnm),
             None => {}
         }
+    }
+
+    /// Fails where the knob that has not answered until now is not going to.
+    fn give_up(&self, status: &LinkStatus, waited: Duration) -> Result<(), Failure> {
+        let refused = match (&status.phase, self.serial) {
+            (Phase::HeldBy(holder), _) if self.arm.is_some() => format!(
+                "not armed: the knob is in use by {holder}: end that program, then start this command again"
+            ),
+            (Phase::Busy(text), _) if self.arm.is_some() => {
+                format!("not armed: {text}, then start this command again")
+            }
+            _ if waited <= PATIENCE => return Ok(()),
+            (Phase::Searching, Some(serial)) => format!(
+                "no knob after {} s: none with the serial number {} is there; without --serial, the first that answers is used",
+                PATIENCE.as_secs(),
+                serial_text(serial)
+            ),
+            _ => format!("no knob after {} s: {}", PATIENCE.as_secs(), status.text),
+        };
+        Err(Failure::Usage(refused))
     }
 
     fn watch(
@@ -331,33 +366,10 @@ impl KnobCommand {
             if enter.take_if(|pressed| pressed.load(Ordering::Relaxed)).is_some() {
                 self.begin(link);
             }
-            if self.arm.is_some() && live_since.is_none() {
-                match &status.phase {
-                    Phase::HeldBy(holder) => {
-                        return Err(Failure::Usage(format!(
-                            "not armed: the knob is in use by {holder}: end that program, then start this command again"
-                        )));
-                    }
-                    Phase::Busy(text) => {
-                        return Err(Failure::Usage(format!(
-                            "not armed: {text}, then start this command again"
-                        )));
-                    }
-                    _ => {}
-                }
+            if live_since.is_none() {
+                self.give_up(&status, began.elapsed())?;
             }
-            if live_since.is_none() && began.elapsed() > PATIENCE {
-                let why = match (&status.phase, self.serial) {
-                    (Phase::Searching, Some(serial)) => format!(
-                        "none with the serial number {} is there; without --serial, the first that answers is used",
-                        serial_text(serial)
-                    ),
-                    _ => status.text.clone(),
-                };
-                return Err(Failure::Usage(format!("no knob after {} s: {why}", PATIENCE.as_secs())));
-            }
-            let is_at_zero =
-                || status.zeros > 0 || status.tier == 0 && status.angle_deg.is_some_and(is_near_zero);
+            let is_at_zero = || status.zeros > 0 || status.angle_deg.is_some_and(is_near_zero);
             if !is_zeroed && live_since.is_some() && is_at_zero() {
                 is_zeroed = true;
                 heard.try_iter().for_each(drop);
@@ -392,6 +404,12 @@ impl KnobCommand {
             1e-3 * f64::from(stats.jitter_p50_us),
             1e-3 * f64::from(stats.jitter_p99_us),
         );
+        if !is_zeroed && take.is_some() {
+            return Err(Failure::Usage(
+                "the knob never showed its zero, so nothing was recorded; let it go where blowing should begin, and start again"
+                    .to_owned(),
+            ));
+        }
         if let Some(take) = take {
             take.keep()?;
         }

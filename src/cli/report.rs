@@ -73,6 +73,7 @@ impl ReportCommand {
         if self.tour {
             return self.write_tour();
         }
+        self.play.refuse_open_holes()?;
         let prepared = self.play.prepare()?;
         refuse_several_players(&prepared)?;
         prepared.warn();

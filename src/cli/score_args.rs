@@ -34,7 +34,7 @@ use chalumeau_core::score::midi_file::Tracks;
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
-use chalumeau_knob::touch::take::Take;
+use chalumeau_knob::touch::take::{Take, TakeEmbouchure};
 use clap::{ArgGroup, Args};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -145,6 +145,17 @@ fn interval(text: &str) -> Result<(u8, u8), String> {
 fn trim(text: &str) -> Result<(u8, f64), String> {
     let (name, cents) = text.split_once('=').ok_or("must be a note and its cents, for example E4=-12")?;
     Ok((note(name)?, within(cents, -TRIM_MOST_CENTS, TRIM_MOST_CENTS)?))
+}
+
+/// The feel with which a take was recorded, if it says so.
+fn recorded_feel(take: &Take) -> Result<Option<FeelDesign>, Failure> {
+    let Some(flags) = &take.head().feel else { return Ok(None) };
+    let read = feel_flags::read(flags).map_err(|reason| {
+        Failure::Usage(format!(
+            "--replay: the take's line \"# feel {flags}\": {reason}; correct that line, or remove it"
+        ))
+    });
+    read.map(Some)
 }
 
 /// Which holes are open, by their names.
@@ -302,10 +313,11 @@ impl ScoreArgs {
                     take.seconds()
                 ));
             }
-            let design = self.feel(&model.file)?;
-            match self.breath.recorded_feel() {
-                Some(flags) if !feel_flags::map_alike(&flags, &design) => warnings.push(format!(
-                    "the take was recorded with {flags}; the feel that you give turns its angles into other pressures"
+            let design = self.feel_of(Some(take), &model.file)?;
+            match recorded_feel(take)? {
+                Some(recorded) if !feel_flags::map_alike(&recorded, &design) => warnings.push(format!(
+                    "the take was recorded with {}; the feel that you give turns its angles into other pressures",
+                    feel_flags::in_flags(&recorded)
                 )),
                 None if self.feel.given().is_none() => warnings.push(format!(
                     "the take does not say its feel; it is replayed with {}",
@@ -313,8 +325,15 @@ impl ScoreArgs {
                 )),
                 _ => {}
             }
-            if let Some(name) = take.instrument().filter(|name| *name != model.file.name) {
+            if let Some(name) = take.head().instrument.as_ref().filter(|name| **name != model.file.name) {
                 warnings.push(format!("the take was played on another instrument: {name}"));
+            }
+            let lip = TakeEmbouchure { zeta: settings.zeta, strength: settings.strength, lip: settings.lip };
+            if let Some(played) = take.head().embouchure.filter(|played| *played != lip) {
+                warnings.push(format!(
+                    "the take was played with --zeta {} --strength {} --lip {}; it is replayed with {}, {} and {}",
+                    played.zeta, played.strength, played.lip, lip.zeta, lip.strength, lip.lip
+                ));
             }
             let law = settings.reed_law();
             if let Some(((h, k), is_one)) = take.reed()
@@ -352,6 +371,17 @@ impl ScoreArgs {
         }
     }
 
+    /// Refuses holes of the user's choice, where what is shown is of the chart's.
+    pub fn refuse_open_holes(&self) -> Result<(), Failure> {
+        match self.open_holes {
+            Some(_) => Err(Failure::Usage(
+                "--open-holes is for `render`: a report shows the fingerings of the chart; leave it out"
+                    .to_owned(),
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// Refuses flags of the knob's feel; `why` they would do nothing.
     pub fn refuse_feel(&self, why: &str) -> Result<(), Failure> {
         match self.feel.given() {
@@ -378,6 +408,10 @@ impl ScoreArgs {
     /// Says which notes begin above all that a curve of gamma reaches. Works out the whole bore, so a batch does not
     /// ask.
     pub fn too_little_breath(&self) -> Option<String> {
+        if self.open_holes.is_some() {
+            // The thresholds are those of the chart's fingerings.
+            return None;
+        }
         let curve = self.breath.curve(self.midi.is_some()).ok()??;
         let reaches = f64::from(curve.gamma_max());
         if reaches >= ALL_BEGIN {
@@ -429,20 +463,24 @@ impl ScoreArgs {
 
     /// The feel of the knob: where no flag says otherwise, the one with which the take was recorded that is replayed.
     pub fn feel(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
-        let Some(flags) = self.breath.recorded_feel() else { return self.feel.design(file) };
-        let recorded = FeelArgs::recorded(&flags).map_err(|reason| {
-            Failure::Usage(format!(
-                "--replay: the take's line \"# feel {flags}\": {reason}; correct that line, or remove it"
-            ))
-        })?;
-        self.feel.or(recorded).design(file)
+        self.feel_of(self.breath.take()?.as_ref(), file)
+    }
+
+    fn feel_of(&self, take: Option<&Take>, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
+        match take.map(recorded_feel).transpose()?.flatten() {
+            Some(recorded) => self.feel.over(&recorded, file),
+            None => self.feel.design(file),
+        }
     }
 
     /// What is played, in a few words.
     pub fn title(&self) -> String {
         match (&self.midi, self.written, self.sounding, self.scale) {
             (Some(path), ..) => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
-            (_, Some(written), ..) => format!("written {}", WrittenNote(written)),
+            (_, Some(written), ..) => match &self.open_holes {
+                Some(holes) => format!("written {}, open: {holes}", WrittenNote(written)),
+                None => format!("written {}", WrittenNote(written)),
+            },
             (_, _, Some(sounding), _) => format!("sounding {}", SoundingNote(sounding)),
             (.., Some((from, to))) => format!("scale {} to {}", WrittenNote(from), WrittenNote(to)),
             // clap asks for one of the four.
@@ -459,7 +497,7 @@ impl ScoreArgs {
         score: &Score<PartEvent>,
     ) -> Result<Vec<Timed<PartEvent>>, Failure> {
         let feels = InstrumentFeel::new(model);
-        let design = self.feel(&model.file)?;
+        let design = self.feel_of(Some(take), &model.file)?;
         let table = feels.table(settings, &design, &NO_MOTOR)?;
         let knob = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
         let hand = take.mapping(feels.maps_for(&table, settings), knob);

@@ -30,7 +30,7 @@ use chalumeau_core::bore::alternate_fingerings::{self, FingeringChoice};
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 use fingering_panel::{Chosen, FingeringPanel};
 
-/// Least distance of two buttons with their names below, points; of half of it where the names of every second stand lower.
+/// Least distance of two buttons with their names in one row below, points. In two rows, half of it is enough.
 const NAMED: f32 = 38.0;
 /// Height of a line of these names, points.
 const NAME_LINE: f32 = 13.0;

@@ -67,6 +67,11 @@ impl SoundAnalysis {
         Self { f0_hz: f0_hz.map(|f0_hz| f0_hz as f32), cents: off, ..blank }
     }
 
+    /// The spectrum alone. Allocates.
+    pub fn without_pitch(samples: &[f32], rate_hz: f64) -> Self {
+        Self::spectrum_of(samples, rate_hz).2
+    }
+
     /// The window that is analysed, how many of its last samples are known, and the analysis without a pitch.
     fn spectrum_of(samples: &[f32], rate_hz: f64) -> (Vec<f64>, usize, Self) {
         let latest = &samples[samples.len().saturating_sub(WINDOW)..];
@@ -105,6 +110,7 @@ mod tests {
             assert!(heard.harmonics_db.is_empty());
         }
         assert_eq!(SoundAnalysis::of_chord(&[], rate_hz, 220.0).f0_hz, None);
+        assert_eq!(SoundAnalysis::without_pitch(&both, rate_hz).f0_hz, None);
     }
 
     #[test]

@@ -58,6 +58,8 @@ pub struct SharedKnob {
     reed_factors: [AtomicU32; 2],
     /// The feel in force. Only the controller and the link lock it.
     feel: Mutex<Option<Arc<FeelInForce>>>,
+    /// What the angles blow: the feel in force or, where no motor makes torque, the one that the parameters describe.
+    blown: Mutex<Option<Arc<FeelInForce>>>,
     /// A test feel, which replaces the feel of any note. Only the window, the controller and the link lock it.
     test: Mutex<Option<message::Feel>>,
     /// The user has chosen a device, so that even the same choice counts as new.
@@ -85,6 +87,7 @@ impl SharedKnob {
             breath: AtomicU32::new(0),
             reed_factors: [one(), one()],
             feel: Mutex::new(None),
+            blown: Mutex::new(None),
             test: Mutex::default(),
             device_chosen: AtomicBool::new(false),
             audio_heart: OnceLock::new(),
@@ -144,6 +147,22 @@ impl SharedKnob {
 
     fn feel_in_force(&self) -> Option<Arc<FeelInForce>> {
         self.feel.lock().ok()?.clone()
+    }
+
+    fn set_feel(&self, in_force: Arc<FeelInForce>) {
+        if let Ok(mut feel) = self.feel.lock() {
+            *feel = Some(in_force);
+        }
+    }
+
+    fn blown(&self) -> Option<Arc<FeelInForce>> {
+        self.blown.lock().ok()?.clone()
+    }
+
+    fn set_blown(&self, now: Arc<FeelInForce>) {
+        if let Ok(mut blown) = self.blown.lock() {
+            *blown = Some(now);
+        }
     }
 
     fn reed_factors(&self) -> [f32; 2] {

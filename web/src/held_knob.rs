@@ -35,9 +35,6 @@ pub struct HeldKnob {
     text: String,
 }
 
-/// A step back of the page's clock by more than this is no late message: the system's clock was set, ms.
-const SET_BACK_MS: f64 = 1_000.0;
-
 /// The page's clock as the session counts. The only one that a page and its audio thread share is that of the system, which may
 /// be set back while a knob is armed; then it goes on from the latest moment.
 struct PageClock {
@@ -46,14 +43,16 @@ struct PageClock {
 }
 
 impl PageClock {
-    fn us(&mut self, now_ms: f64) -> i64 {
-        let before_ms = self.latest_ms - (now_ms + self.shift_ms);
-        if before_ms > SET_BACK_MS {
-            self.shift_ms += before_ms;
-        }
-        let at_ms = now_ms + self.shift_ms;
-        self.latest_ms = self.latest_ms.max(at_ms);
-        (1e3 * at_ms) as i64
+    /// Now, as the audio thread reads it: a step back is one of the system's clock.
+    fn now_us(&mut self, now_ms: f64) -> i64 {
+        self.shift_ms = self.shift_ms.max(self.latest_ms - now_ms);
+        self.latest_ms = now_ms + self.shift_ms;
+        (1e3 * self.latest_ms) as i64
+    }
+
+    /// A moment that the page has noted, which comes late, and may be from before the clock was set back.
+    fn noted_us(&self, at_ms: f64) -> i64 {
+        (1e3 * (at_ms + self.shift_ms).min(self.latest_ms)) as i64
     }
 }
 
@@ -69,7 +68,7 @@ impl HeldKnob {
     /// A port that has just been opened; `number` is random. Allocates.
     pub fn new(number: u32, now_ms: f64) -> Self {
         let mut clock = PageClock { latest_ms: now_ms, shift_ms: 0.0 };
-        let now_us = clock.us(now_ms);
+        let now_us = clock.now_us(now_ms);
         Self {
             session: HostSession::new(Binding::Serial, number, now_us),
             poses: Poses::default(),
@@ -86,18 +85,18 @@ impl HeldKnob {
 
     /// The page lives and obeys the user.
     pub fn beat(&mut self, now_ms: f64) {
-        self.beat_us = self.clock.us(now_ms);
+        self.beat_us = self.clock.now_us(now_ms);
     }
 
     /// Bytes of the port, and when the page read them.
     pub fn receive(&mut self, now_ms: f64, bytes: &[u8]) {
         let Self { session, poses, slap, clock, .. } = self;
-        session.receive(clock.us(now_ms), bytes, &mut |event| told(poses, slap, event));
+        session.receive(clock.noted_us(now_ms), bytes, &mut |event| told(poses, slap, event));
     }
 
     /// Lets time pass before a block of `frames` samples, with a note fingered.
     pub fn turn(&mut self, now_ms: f64, frames: usize, rate_hz: f64, note: Option<SoundingNote>) {
-        self.now_us = self.clock.us(now_ms);
+        self.now_us = self.clock.now_us(now_ms);
         let Self { session, poses, slap, out, baud, .. } = self;
         session.obeyed(self.beat_us, PAGE);
         if self.played.maps.is_ready() {
@@ -231,10 +230,12 @@ mod tests {
     #[test]
     fn a_clock_that_is_set_back_goes_on() {
         let mut clock = PageClock { latest_ms: 5_000.0, shift_ms: 0.0 };
-        assert_eq!(clock.us(90_000.0), 90_000_000);
-        assert_eq!(clock.us(89_995.0), 89_995_000, "a late message");
-        assert_eq!(clock.us(30_000.0), 90_000_000, "set back by a minute");
-        assert_eq!(clock.us(30_010.0), 90_010_000);
-        assert_eq!(clock.us(30_007.0), 90_007_000);
+        assert_eq!(clock.now_us(90_000.0), 90_000_000);
+        assert_eq!(clock.noted_us(89_995.0), 89_995_000, "a late message");
+        assert_eq!(clock.now_us(30_000.0), 90_000_000, "set back by a minute");
+        assert_eq!(clock.noted_us(89_999.0), 90_000_000, "noted before that");
+        assert_eq!(clock.now_us(30_010.0), 90_010_000);
+        assert_eq!(clock.noted_us(30_007.0), 90_007_000);
+        assert_eq!(clock.now_us(29_900.0), 90_010_000, "and by a little more");
     }
 }

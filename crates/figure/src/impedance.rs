@@ -107,7 +107,7 @@ pub fn fingering(about: &FingeringImpedance<'_>) -> Figure {
     figure.panel(upper).panel(lower).size(1_600, 1_150)
 }
 
-/// A mode this far from a multiple of the note, cents, still is one of its partials' resonances.
+/// Cents are shown only for modes within this of a multiple of the note.
 const NEAR_CENTS: f64 = 100.0;
 
 /// Discs on the modes, with frequency and cents; words that would run into each other go up in steps.

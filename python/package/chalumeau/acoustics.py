@@ -144,7 +144,7 @@ def bifurcation(
     these depend on ``seconds``. The same as ``chalumeau bifurcation``.
 
     >>> import chalumeau
-    >>> ramp = chalumeau.bifurcation("F3", to=1.0, seconds=1.0)
+    >>> ramp = chalumeau.bifurcation("F3", to=1.0, seconds=4.0)
     >>> bool(1 / 3 < ramp["begins"] < 0.6), ramp["chokes"]
     (True, None)
     """

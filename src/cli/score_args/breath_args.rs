@@ -2,11 +2,9 @@
 
 use crate::cli::Failure;
 use crate::cli::shared_args::{dynamics, within};
-use crate::feel_flags;
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
-use std::io::BufRead;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -35,8 +33,8 @@ pub(super) struct BreathArgs {
     #[arg(long, value_name = "FROM:TO")]
     pub crescendo: Option<String>,
     /// Breath from a recorded take: a CSV file with t_us and angle_deg, from the plugin or `chalumeau knob`. Each note turns
-    /// the angle into its own pressure, with the feel that the take was recorded with, as far as no flag of the feel is given. The take's
-    /// gamma is what the hand felt; with --breath-response physical it blows
+    /// the angle into its own pressure. The take's own feel is used; flags of the feel replace it. The take's gamma is what the hand
+    /// felt; with --breath-response physical it blows
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
 }
@@ -106,14 +104,6 @@ impl BreathArgs {
     /// The recorded take whose angles blow.
     pub fn take(&self) -> Result<Option<Take>, Failure> {
         self.replay.as_deref().map(read_take).transpose()
-    }
-
-    /// The feel that the take was recorded with, as flags.
-    pub fn recorded_feel(&self) -> Option<String> {
-        let file = fs::File::open(self.replay.as_deref()?).ok()?;
-        let mut remarks =
-            io::BufReader::new(file).lines().map_while(Result::ok).take_while(|line| line.starts_with('#'));
-        remarks.find_map(|line| feel_flags::in_remark(&line).map(str::to_owned))
     }
 
     /// The files that are read. A number and a ramp are none.

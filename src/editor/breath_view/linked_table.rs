@@ -13,16 +13,15 @@ use crate::parameters::{Kind, Parameter, Value};
 /// Of the list of devices, points: all of them at once.
 const LIST_HEIGHT: f32 = 320.0;
 
+/// What [`ANY_DEVICE`] does.
+const ANY_SHOWS: &str = "As in a new instance: keys blow by their velocity; CC2, CC11 or pressure takes over as soon as it moves.";
+
 /// What the list offers first. Some devices need nothing else, so that their names would stand where nobody has chosen one.
-static ANY_DEVICE: LazyLock<ControllerMap> = LazyLock::new(|| {
-    ControllerMap {
+static ANY_DEVICE: LazyLock<ControllerMap> = LazyLock::new(|| ControllerMap {
     name: "Any keyboard or controller".to_owned(),
-    shows:
-        "As in a new instance: keys blow by their velocity; CC2, CC11 or pressure takes over as soon as it moves."
-            .to_owned(),
+    shows: ANY_SHOWS.to_owned(),
     links: Vec::new(),
     values: Vec::new(),
-}
 });
 
 /// Whether parameters and these links are as a device needs them.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use chalumeau_core::haptics::FeelTable;
+use chalumeau_core::haptics::{FeelDesign, FeelTable};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 use chalumeau_knob::touch::feel::{InstrumentFeel, PitchMaps};
@@ -12,6 +12,7 @@ use chalumeau_knob::wire::message::Feel;
 #[derive(Debug)]
 pub struct FeelInForce {
     feels: Arc<InstrumentFeel>,
+    design: FeelDesign,
     table: FeelTable,
     /// Angle to breath, as it blows, and to the pressure that is felt there.
     blown: PitchMaps,
@@ -21,9 +22,15 @@ pub struct FeelInForce {
 }
 
 impl FeelInForce {
-    /// Of a table that was worked out for `settings`. Allocates.
-    pub fn new(feels: Arc<InstrumentFeel>, table: FeelTable, settings: &Settings) -> Self {
+    /// Of a table that was worked out for `settings` and `design`. Allocates.
+    pub fn new(
+        feels: Arc<InstrumentFeel>,
+        design: FeelDesign,
+        table: FeelTable,
+        settings: &Settings,
+    ) -> Self {
         Self {
+            design,
             blown: feels.maps_for(&table, settings),
             felt: feels.maps(&table),
             full_pa: 1e3 * f64::from(settings.breath_full_kpa),
@@ -31,6 +38,11 @@ impl FeelInForce {
             feels,
             table,
         }
+    }
+
+    /// The design that it follows.
+    pub fn design(&self) -> &FeelDesign {
+        &self.design
     }
 
     /// What the knob's angles blow.
@@ -61,7 +73,6 @@ impl FeelInForce {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use chalumeau_core::haptics::FeelDesign;
     use chalumeau_core::instrument::BreathResponse;
     use chalumeau_core::instrument::player::response::ONSET;
     use chalumeau_knob::touch::feel::NO_MOTOR;
@@ -73,8 +84,9 @@ mod tests {
         assert_eq!(played.breath_response, BreathResponse::Played);
         let physical = Settings { breath_response: BreathResponse::Physical, ..played };
         for (settings, begins) in [(played, Some(ONSET as f32)), (physical, None)] {
-            let table = feels.table(&settings, &FeelDesign::default(), &NO_MOTOR).unwrap();
-            let force = FeelInForce::new(feels.clone(), table, &settings);
+            let design = FeelDesign::default();
+            let table = feels.table(&settings, &design, &NO_MOTOR).unwrap();
+            let force = FeelInForce::new(feels.clone(), design, table, &settings);
             for note in [50, 60, 70, 80].map(SoundingNote) {
                 let sounds = force.sounds_from(note.written(2).unwrap()).unwrap();
                 let full_gamma = f64::from(settings.breath_full_kpa) * 1e3 / settings.closing_pa();

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use super::feel_design::{feel_design, knob_design};
 use super::feels_cache::FeelsCache;
 use super::heard_sound::SoundSender;
-use super::slow_work::from_zero;
+use super::slow_work::{from_zero, recorded_feel};
 use super::take_recorder::load_take;
 use super::{NO_NOTE, SharedKnob};
 use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
@@ -114,9 +114,8 @@ impl KnobAudio {
         // If the take or the feel fails to load, nothing is replayed; the controller reports why.
         let Ok(take) = load_take(&path) else { return };
         let Some(feels) = FeelsCache::default().of(instrument) else { return };
-        let Ok(table) = feels.table(&params.settings(), &feel_design(&params.knob), &NO_MOTOR) else {
-            return;
-        };
+        let design = recorded_feel(&take).unwrap_or_else(|| feel_design(&params.knob));
+        let Ok(table) = feels.table(&params.settings(), &design, &NO_MOTOR) else { return };
         let maps = feels.maps_for(&table, &params.settings());
         let hand = take.mapping(maps, from_zero(knob_design(&params.knob)));
         self.prepared = Some(PreparedReplay { hand, take });

@@ -182,7 +182,7 @@ impl KnobController {
                     .note()
                     .and_then(|note| note.written(instrument.transposition()))
                     .map(|WrittenNote(written)| written),
-                gamma: shared.feel_in_force().map_or(0.0, |feel| feel.gamma(shared.note(), shared.breath())),
+                gamma: shared.blown().map_or(0.0, |feel| feel.gamma(shared.note(), shared.breath())),
                 feel_id: state.feel_id,
             });
         };

@@ -12,6 +12,7 @@ use super::feel_in_force::FeelInForce;
 use super::feels_cache::FeelsCache;
 use super::heard_sound::SoundListener;
 use super::take_recorder::{TakeRecorder, load_take, marks};
+use crate::feel_flags;
 use crate::plugin::instrument_loading::SharedInstrument;
 use crate::plugin::params::ChalumeauParams;
 use crate::plugin::params::knob::KnobKind;
@@ -22,8 +23,8 @@ use chalumeau_core::instrument::Settings;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::LinkStatus;
 use chalumeau_knob::touch::breath_from_angle::BreathMapping;
-use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
-use chalumeau_knob::touch::take::{Take, TakeHand, TakeRow};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR, PitchMaps};
+use chalumeau_knob::touch::take::{Take, TakeEmbouchure, TakeHand, TakeHead, TakeRow};
 
 /// What the slow work tells the user.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,13 +48,15 @@ struct FeelInputs {
     limits: TorqueLimits,
     /// A motor makes torque.
     is_felt: bool,
+    /// That of the take that is replayed.
+    replayed: Option<FeelDesign>,
 }
 
 impl FeelInputs {
     fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.feels, &other.feels)
-            && (self.settings, self.design, self.limits, self.is_felt)
-                == (other.settings, other.design, other.limits, other.is_felt)
+            && (self.settings, self.design, self.limits, self.is_felt, self.replayed)
+                == (other.settings, other.design, other.limits, other.is_felt, other.replayed)
     }
 }
 
@@ -65,6 +68,8 @@ pub struct SlowWork {
     feels_cache: FeelsCache,
     hand_in: triple_buffer::Input<BreathMapping>,
     hand: BreathMapping,
+    /// What the angles of a take mean that says its feel.
+    replay_maps: Option<PitchMaps>,
     take: triple_buffer::Input<Option<Arc<Take>>>,
     /// What the feel in force was computed from.
     feel_inputs: Option<FeelInputs>,
@@ -94,6 +99,7 @@ impl SlowWork {
             feels_cache: FeelsCache::default(),
             hand_in,
             hand: BreathMapping::default(),
+            replay_maps: None,
             take,
             feel_inputs: None,
             rows,
@@ -120,11 +126,12 @@ impl SlowWork {
         let knob = &params.knob;
         let has_knob = knob.kind.value() != KnobKind::Off;
         let status = self.shared.status();
-        if has_knob || knob.replay.value() {
-            self.update_feel(&params, status.as_ref());
-        }
         let is_new = self.update_replay();
-        self.update_hand(status.as_ref());
+        let mut has_changed = false;
+        if has_knob || knob.replay.value() {
+            has_changed = self.update_feel(&params, status.as_ref());
+        }
+        self.update_hand(status.as_ref(), has_changed);
         if is_new {
             // After its hand.
             self.take.write(self.replayed.clone());
@@ -134,8 +141,8 @@ impl SlowWork {
         self.shared.tell(&self.texts);
     }
 
-    /// Computes the feel again if one of its inputs has changed.
-    fn update_feel(&mut self, params: &ChalumeauParams, status: Option<&LinkStatus>) {
+    /// Computes the feel again if one of its inputs has changed; then true.
+    fn update_feel(&mut self, params: &ChalumeauParams, status: Option<&LinkStatus>) -> bool {
         let settings = params.settings().with_reed_factors(self.shared.reed_factors());
         let design = feel_design(&params.knob);
         let ceiling_mnm = params.knob.ceiling.value().round() as u16;
@@ -143,36 +150,38 @@ impl SlowWork {
             Some(info) => info.torque_limits(ceiling_mnm),
             None => TorqueLimits { ceiling_mnm: f64::from(ceiling_mnm), ..TorqueLimits::default() },
         };
-        let Some(feels) = self.feels_cache.of(&self.instrument) else { return };
+        let Some(feels) = self.feels_cache.of(&self.instrument) else { return false };
         let is_felt = status.is_some_and(makes_torque);
-        let inputs = FeelInputs { feels, settings, design, limits, is_felt };
+        let replayed = self.replayed.as_deref().and_then(recorded_feel);
+        let inputs = FeelInputs { feels, settings, design, limits, is_felt, replayed };
         if self.feel_inputs.as_ref().is_some_and(|before| before.is_same(&inputs)) {
-            return;
+            return false;
         }
         self.feel_inputs = Some(inputs.clone());
         self.texts.short_breath = short_breath(&settings);
-        let FeelInputs { feels, .. } = inputs;
-        match feels.table(&settings, &design, &limits) {
+        let feels = inputs.feels;
+        let felt = |design: FeelDesign, table| FeelInForce::new(feels.clone(), design, table, &settings);
+        // No torque is too much where none is made.
+        let unfelt =
+            |design| feels.table(&settings, &design, &NO_MOTOR).ok().map(|table| felt(design, table));
+        self.replay_maps = replayed.and_then(unfelt).map(|force| force.maps());
+        let blown = match feels.table(&settings, &design, &limits) {
             Ok(table) => {
-                let in_force = FeelInForce::new(feels, table, &settings);
-                self.hand.maps = in_force.maps();
-                if let Ok(mut feel) = self.shared.feel.lock() {
-                    *feel = Some(Arc::new(in_force));
-                }
                 self.texts.refused = None;
+                let in_force = Arc::new(felt(design, table));
+                self.shared.set_feel(in_force.clone());
+                Some(in_force)
             }
             Err(reason) => {
                 self.texts.refused = Some(format!("feel unchanged: {reason}"));
-                // A motor keeps its feel, whose angles keep their breath. Without one, no torque is too much.
-                let in_force = self.shared.feel_in_force().filter(|_| is_felt);
-                self.hand.maps = match (in_force, feels.table(&settings, &design, &NO_MOTOR)) {
-                    (Some(in_force), _) => in_force.maps(),
-                    (None, Ok(table)) => feels.maps_for(&table, &settings),
-                    (None, Err(_)) => return,
-                };
+                // A motor keeps its feel, whose angles keep their breath.
+                self.shared.feel_in_force().filter(|_| is_felt).or_else(|| unfelt(design).map(Arc::new))
             }
+        };
+        if let Some(blown) = blown {
+            self.shared.set_blown(blown);
         }
-        self.hand_in.write(self.hand);
+        true
     }
 
     /// How the angles blow of the knob that is there.
@@ -185,16 +194,19 @@ impl SlowWork {
         TakeHand { design: if is_felt { from_zero(design) } else { design }, feels }
     }
 
-    fn update_hand(&mut self, status: Option<&LinkStatus>) {
+    fn update_hand(&mut self, status: Option<&LinkStatus>, has_changed: bool) {
         let usual = from_zero(knob_design(&self.params.knob));
         let TakeHand { design, feels } = match &self.replayed {
             Some(take) => take.hand(usual),
             None => self.hand_of(status),
         };
-        if (self.hand.design, self.hand.feels) != (design, feels) {
-            (self.hand.design, self.hand.feels) = (design, feels);
-            self.hand_in.write(self.hand);
+        if !has_changed && (self.hand.design, self.hand.feels) == (design, feels) {
+            return;
         }
+        let of_take = self.replay_maps.filter(|_| self.replayed.is_some());
+        let maps = of_take.or_else(|| Some(self.shared.blown()?.maps())).unwrap_or(self.hand.maps);
+        self.hand = BreathMapping { maps, design, feels };
+        self.hand_in.write(self.hand);
     }
 
     /// Loads the take to replay, if that has changed; then true.
@@ -226,15 +238,13 @@ impl SlowWork {
             self.texts.take = Some("nothing to record: choose a knob first".to_owned());
         }
         moments.set_possible(Moment::Record, has_knob);
-        let hand = self.hand_of(status);
-        let playing = self.instrument.current();
-        let name = playing.as_ref().map_or("", |playing| playing.model.file.name.as_str());
-        if wanted && let Err(reason) = self.recorder.begin(&self.params, name, hand) {
+        let settings = self.params.settings().with_reed_factors(self.shared.reed_factors());
+        let is_new = wanted && self.recorder.rows().is_none();
+        if is_new && let Err(reason) = self.recorder.begin(&self.params, &self.head(&settings, status)) {
             self.params.moments.set_possible(Moment::Record, false);
             self.texts.take = Some(reason);
             return;
         }
-        let settings = self.params.settings().with_reed_factors(self.shared.reed_factors());
         let mut marks = marks(&self.params, &settings);
         if self.texts.refused.is_some() {
             // The feel did not follow the sound, so these rows do not belong to a study.
@@ -251,10 +261,26 @@ impl SlowWork {
         }
     }
 
+    /// What a take that begins now says of itself.
+    fn head(&self, settings: &Settings, status: Option<&LinkStatus>) -> TakeHead {
+        let &Settings { zeta, strength, lip, .. } = settings;
+        TakeHead {
+            instrument: self.instrument.current().map(|current| current.model.file.name.clone()),
+            feel: self.shared.blown().map(|blown| feel_flags::in_flags(blown.design())),
+            hand: Some(self.hand_of(status)),
+            embouchure: Some(TakeEmbouchure { zeta, strength, lip }),
+        }
+    }
+
     /// Gamma at which a note begins to sound with the feel in force.
     fn sounds_from(&self, written: WrittenNote) -> Option<f64> {
-        self.shared.feel_in_force()?.sounds_from(written)
+        self.shared.blown()?.sounds_from(written)
     }
+}
+
+/// The feel with which a take was recorded, if it says so in words that are known.
+pub(super) fn recorded_feel(take: &Take) -> Option<FeelDesign> {
+    feel_flags::read(take.head().feel.as_ref()?).ok()
 }
 
 /// Whether the hand may feel a torque of the knob: its own motor's, or one by way of a bridge.

@@ -7,14 +7,12 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::feel_design::feel_design;
 use super::heard_sound::SoundListener;
-use crate::feel_flags;
 use crate::output::NewFile;
 use crate::plugin::params::ChalumeauParams;
 use crate::take_file::TakeFile;
 use chalumeau_core::instrument::Settings;
 use chalumeau_knob::touch::study::{StudySide, plan};
-use chalumeau_knob::touch::take::{Take, TakeHand, TakeMarks, TakeRow};
-use chalumeau_knob::touch::take_csv::instrument_remark;
+use chalumeau_knob::touch::take::{Take, TakeHead, TakeMarks, TakeRow};
 
 /// Environment variable that names another folder for takes.
 const TAKES: &str = "CHALUMEAU_TAKES";
@@ -46,15 +44,10 @@ impl TakeRecorder {
         Self { recording: None, sound, waiting: VecDeque::new() }
     }
 
-    /// Opens a new take on the instrument of this name, of this hand, if none is open.
-    pub fn begin(
-        &mut self,
-        params: &ChalumeauParams,
-        instrument: &str,
-        hand: TakeHand,
-    ) -> Result<(), String> {
+    /// Opens a new take that begins with this head, if none is open.
+    pub fn begin(&mut self, params: &ChalumeauParams, head: &TakeHead) -> Result<(), String> {
         if self.recording.is_none() {
-            self.recording = Some(create(params, instrument, hand)?);
+            self.recording = Some(create(params, head)?);
         }
         Ok(())
     }
@@ -131,7 +124,7 @@ pub fn marks(params: &ChalumeauParams, settings: &Settings) -> TakeMarks {
 }
 
 /// Creates a new take in the folder of takes.
-fn create(params: &ChalumeauParams, instrument: &str, hand: TakeHand) -> Result<Recording, String> {
+fn create(params: &ChalumeauParams, head: &TakeHead) -> Result<Recording, String> {
     let folder = match std::env::var_os(TAKES) {
         Some(folder) => PathBuf::from(folder),
         None => dirs::document_dir()
@@ -154,14 +147,13 @@ fn create(params: &ChalumeauParams, instrument: &str, hand: TakeHand) -> Result<
         })
         .find(|path| !path.exists())
         .ok_or_else(|| format!("{} has too many takes of this second", folder.display()))?;
-    let begun = NewFile::create(&path, false)
-        .and_then(|file| TakeFile::begin(file, &remarks(params, instrument, hand)));
+    let begun = NewFile::create(&path, false).and_then(|file| TakeFile::begin(file, &remarks(params, head)));
     let writer = begun.map_err(|reason| reason.to_string())?;
     Ok(Recording { writer, path, rows: 0, error: None })
 }
 
-/// The lines above a take's columns: program, feel and hand at the beginning, and the order of the study's trials.
-fn remarks(params: &ChalumeauParams, instrument: &str, hand: TakeHand) -> Vec<String> {
+/// The lines above a take's columns: program, what is played and felt at the beginning, and the order of the study's trials.
+fn remarks(params: &ChalumeauParams, head: &TakeHead) -> Vec<String> {
     let knob = &params.knob;
     let feel = feel_design(knob);
     let mut remarks = vec![
@@ -169,9 +161,6 @@ fn remarks(params: &ChalumeauParams, instrument: &str, hand: TakeHand) -> Vec<St
             "Chalumeau {} take; t_us and heard_us are the host's clock, angle from the knob's zero",
             env!("CARGO_PKG_VERSION")
         ),
-        instrument_remark(instrument),
-        feel_flags::remark(&feel),
-        hand.remark(),
         format!(
             "damping {} mNm s/rad, friction {} mNm, wall {} mNm per degree from {} of the angle of closure, \
              slap {} mNm per degree, a change takes {} ms",
@@ -183,6 +172,7 @@ fn remarks(params: &ChalumeauParams, instrument: &str, hand: TakeHand) -> Vec<St
             feel.morph_ms
         ),
     ];
+    remarks.extend(head.remarks());
     if let Some((participant, ..)) = knob.study() {
         let seed = knob.seed.value();
         let order: Vec<String> = plan(participant, seed as u32)

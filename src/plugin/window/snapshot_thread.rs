@@ -291,6 +291,8 @@ impl SnapshotThread {
             Some(wanted_hz) if inside.is_chord => {
                 SoundAnalysis::of_chord(sound, inside.host_rate_hz, wanted_hz)
             }
+            // The first player rests; the others are not shown.
+            None if inside.is_chord => SoundAnalysis::without_pitch(sound, inside.host_rate_hz),
             wanted => SoundAnalysis::of(sound, inside.host_rate_hz, wanted),
         }
     }

@@ -21,9 +21,13 @@ pub const SOUNDING_RMS: f64 = 0.01;
 const STILL_S: f64 = 0.1;
 /// Shortest window, s.
 const WINDOW_S: f64 = 0.02;
-/// Of less power at its frequency than this share the sound is of another register. A note has half and more; one that is a semitone
-/// off, in the shortest window of the highest notes, a tenth.
+/// Below this share of power at the frequency of the note, another register sounds. A note has half and more, and six tenths of that
+/// when it is a semitone off.
 const OWN_SHARE: f64 = 0.05;
+/// So many windows one after another are no beginning of a note, which has all frequencies.
+const OTHER_WINDOWS: usize = 3;
+/// The share is that of pieces of so many periods: longer ones would miss a note that is off, shorter ones hear another register.
+const PIECE: f64 = 6.0;
 
 /// One window of the ramp: a point of the diagram.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,6 +103,19 @@ impl BifurcationDiagram {
     }
 }
 
+impl BifurcationDiagram {
+    /// Where another register sounds first: the direction of the ramp (1 or -1) and gamma; `None` if it never does for
+    /// three windows one after another.
+    pub fn other_register(&self) -> Option<(i8, f64)> {
+        let is_other = |point: &RampPoint| point.rms > SOUNDING_RMS && !point.sounds();
+        let first = |way: &[RampPoint]| {
+            let found = way.windows(OTHER_WINDOWS).find(|points| points.iter().all(is_other))?;
+            Some(found[0].gamma)
+        };
+        first(&self.up).map(|gamma| (1, gamma)).or_else(|| first(&self.down).map(|gamma| (-1, gamma)))
+    }
+}
+
 /// Plays `note` while gamma goes from 0 to `gamma_max` and back, `seconds` each way, after a moment of silence. Allocates.
 ///
 /// The breath is physical whatever `settings` say; they must let full breath reach `gamma_max` (`breath_full_kpa`). `rate` is the host's sample rate, Hz. `each` is
@@ -122,7 +139,7 @@ pub fn measure(
     let period = inner_hz / note.frequency_hz(f64::from(settings.a4_hz));
     let window = (period * (WINDOW_S * inner_hz / period).ceil()).round() as usize;
     let closing_pa = settings.closing_pa();
-    let turn = std::f64::consts::TAU / period;
+    let piece = Piece { samples: (PIECE * period).round() as usize, turn: std::f64::consts::TAU / period };
     let half = (seconds * inner_hz) as usize;
     let mut still = (STILL_S * inner_hz).round() as usize;
     let mut found = BifurcationDiagram::default();
@@ -132,7 +149,7 @@ pub fn measure(
             still -= 1;
             return;
         }
-        inside.add(&probe, closing_pa, turn);
+        inside.add(&probe, closing_pa, &piece);
         seen += 1;
         if inside.count == window {
             let point = std::mem::take(&mut inside).point();
@@ -154,19 +171,35 @@ struct Window {
     sum: f64,
     squares: f64,
     shut: usize,
-    /// Sums of cosine and sine at the frequency of the note, and of the pressure with them.
+    /// Of the piece that has begun: samples, sum of the pressure, and sums of cosine and sine at the frequency of the note, alone and
+    /// with the pressure.
+    begun: usize,
+    part: f64,
     wave: [f64; 2],
     at_note: [f64; 2],
+    /// Of the pieces that are complete: power at the note, and how many they are.
+    own: f64,
+    pieces: usize,
+}
+
+/// A piece of a window: its samples, and the phase of the note from one to the next, radians.
+struct Piece {
+    samples: usize,
+    turn: f64,
 }
 
 impl Window {
-    /// `turn` is the phase of the note from one sample to the next, radians.
-    fn add(&mut self, probe: &Probe, closing_pa: f64, turn: f64) {
+    fn add(&mut self, probe: &Probe, closing_pa: f64, piece: &Piece) {
         let p = probe.p_mouthpiece_pa / closing_pa;
-        let phase = turn * self.count as f64;
+        let phase = piece.turn * self.begun as f64;
         for (which, wave) in [maths::cos(phase), maths::sin(phase)].into_iter().enumerate() {
             self.wave[which] += wave;
             self.at_note[which] += p * wave;
+        }
+        self.part += p;
+        self.begun += 1;
+        if self.begun == piece.samples {
+            self.complete();
         }
         self.count += 1;
         self.gamma += probe.gamma;
@@ -175,12 +208,25 @@ impl Window {
         self.shut += usize::from(probe.opening < SHUT);
     }
 
-    fn point(self) -> RampPoint {
+    /// Ends the piece that has begun.
+    fn complete(&mut self) {
+        let count = self.begun.max(1) as f64;
+        let mean = self.part / count;
+        let amplitude = |which: usize| 2.0 / count * (self.at_note[which] - mean * self.wave[which]);
+        self.own += 0.5 * (amplitude(0).powi(2) + amplitude(1).powi(2));
+        self.pieces += 1;
+        (self.begun, self.part, self.wave, self.at_note) = (0, 0.0, [0.0; 2], [0.0; 2]);
+    }
+
+    fn point(mut self) -> RampPoint {
         let count = self.count.max(1) as f64;
         let mean = self.sum / count;
         let power = (self.squares / count - mean * mean).max(0.0);
-        let part = |which: usize| 2.0 / count * (self.at_note[which] - mean * self.wave[which]);
-        let own = 0.5 * (part(0).powi(2) + part(1).powi(2));
+        if self.pieces == 0 {
+            // A low note: the window has fewer periods.
+            self.complete();
+        }
+        let own = self.own / self.pieces as f64;
         RampPoint {
             gamma: self.gamma / count,
             rms: power.sqrt(),
@@ -225,9 +271,32 @@ mod tests {
         other.down[1].own = 0.01;
         let changes = other.transitions();
         assert_eq!((changes.chokes, changes.returns), (Some(1.0), Some(0.45)));
+        assert_eq!(other.other_register(), None, "one window");
+        other.up.iter_mut().for_each(|point| point.own = 0.01);
+        assert_eq!(other.other_register(), Some((1, 0.4)));
         // The release of the tongue alone.
         let up = [0.04, 0.02, 0.005, 0.001].map(|rms| point(0.1, rms, 0.0)).to_vec();
         assert_eq!(BifurcationDiagram { up, down: Vec::new() }.transitions(), Transitions::default());
+    }
+
+    #[test]
+    fn a_note_that_is_off_is_the_note_and_another_register_is_not() {
+        // C7 at 96 kHz.
+        let period = 96_000.0 / 1_864.66;
+        let piece =
+            Piece { samples: (PIECE * period).round() as usize, turn: std::f64::consts::TAU / period };
+        let share = |ratio: f64| {
+            let mut window = Window::default();
+            for n in 0..1_956 {
+                let p = 1.0 + 0.3 * maths::sin(ratio * piece.turn * f64::from(n));
+                window.add(&Probe { p_mouthpiece_pa: p, ..Probe::default() }, 1.0, &piece);
+            }
+            window.point().own
+        };
+        assert!(share(1.0) > 0.99 && share(1.06) > 0.5 && share(0.966) > 0.8);
+        for ratio in [1.0 / 3.0, 0.39, 0.6, 5.0 / 3.0] {
+            assert!(share(ratio) < OWN_SHARE, "{ratio}: {}", share(ratio));
+        }
     }
 
     #[test]

@@ -48,14 +48,37 @@ pub struct TakeHand {
     pub feels: bool,
 }
 
+/// What sets a reed besides H and k, as the settings have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TakeEmbouchure {
+    /// Embouchure parameter.
+    pub zeta: f32,
+    /// Strength as on the box.
+    pub strength: f32,
+    /// Tip opening under the lip over the reference.
+    pub lip: f32,
+}
+
+/// What a take says of itself above its columns; what it does not say is `None`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TakeHead {
+    /// Name of the instrument that was played.
+    pub instrument: Option<String>,
+    /// The feel, as flags of the command line.
+    pub feel: Option<String>,
+    /// How its angles blow.
+    pub hand: Option<TakeHand>,
+    /// The reed under the lip.
+    pub embouchure: Option<TakeEmbouchure>,
+}
+
 /// A take in memory, never empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Take {
     pub(super) rows: Vec<TakeRow>,
-    pub(super) hand: Option<TakeHand>,
+    pub(super) head: TakeHead,
     pub(super) reed: Option<(f64, f64)>,
     pub(super) has_one_reed: bool,
-    pub(super) instrument: Option<String>,
 }
 
 impl Take {
@@ -69,14 +92,14 @@ impl Take {
         self.reed.map(|reed| (reed, self.has_one_reed))
     }
 
-    /// Name of the instrument that was played, if it says so.
-    pub fn instrument(&self) -> Option<&str> {
-        self.instrument.as_deref()
+    /// What it says of itself.
+    pub fn head(&self) -> &TakeHead {
+        &self.head
     }
 
     /// How its angles blow: as it says or, where it says nothing, with `usual` on a knob that gave the feel.
     pub fn hand(&self, usual: KnobDesign) -> TakeHand {
-        self.hand.unwrap_or(TakeHand { design: usual, feels: true })
+        self.head.hand.unwrap_or(TakeHand { design: usual, feels: true })
     }
 
     /// What its angles mean on an instrument with these maps; `usual` as in [`hand`](Self::hand).

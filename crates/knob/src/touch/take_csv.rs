@@ -2,11 +2,10 @@
 //!
 //! The first line names the columns; lines that begin with `#` are comments. `t_us` and `angle_deg` are required, at any
 //! place; the other columns may be missing or empty. Unknown columns are ignored. Time may start anywhere but must not
-//! go back; a replay starts at the first row. Above the columns, a comment `# hand` says how the angles blow, and `# instrument` what was
-//! played.
+//! go back; a replay starts at the first row. Above the columns, comments say what was played and felt ([`TakeHead`]).
 
 use crate::touch::study::StudySide;
-use crate::touch::take::{Take, TakeHand, TakeMarks, TakeRow};
+use crate::touch::take::{Take, TakeEmbouchure, TakeHand, TakeHead, TakeMarks, TakeRow};
 use chalumeau_core::control::knob::KnobDesign;
 use std::io::{self, BufRead, BufReader, Read, Write};
 
@@ -20,10 +19,11 @@ const MOST_DEG: f64 = 36_000.0;
 /// Largest magnitude of any other number; only keeps out what no knob measures.
 const MOST_MEASURED: f64 = 1e9;
 
-/// How a comment about the hand begins.
-const HAND: &str = "hand ";
-/// How a comment about the instrument begins.
+/// How the comments begin that are read; all others are for people.
+const HAND: &str = "hand zero_deg=";
 const INSTRUMENT: &str = "instrument ";
+const FEEL: &str = "feel --";
+const REED: &str = "reed zeta=";
 /// Most bytes of the comments above the columns that are read as such.
 const HEAD_MOST: u64 = 65_536;
 
@@ -55,9 +55,9 @@ pub enum TakeError {
         /// Time of this row, us.
         now: u64,
     },
-    /// The comment about the hand.
-    #[error("`{0}` does not say how the angles blow; correct that line, or remove it")]
-    Hand(String),
+    /// One of the comments that are read.
+    #[error("`{0}` cannot be read; correct that line, or remove it")]
+    Comment(String),
     /// No rows.
     #[error("the take has no rows")]
     Empty,
@@ -73,18 +73,15 @@ impl Take {
     /// Reads a take from a CSV file. The first error ends the reading; its text names the line.
     pub fn read(from: impl Read) -> Result<Self, TakeError> {
         let mut from = BufReader::new(from);
-        let mut head = Vec::new();
+        let mut above = Vec::new();
         let broken = csv::Error::from;
-        while (head.len() as u64) < HEAD_MOST && from.fill_buf().map_err(broken)?.first() == Some(&b'#') {
-            from.by_ref().take(HEAD_MOST).read_until(b'\n', &mut head).map_err(broken)?;
+        while (above.len() as u64) < HEAD_MOST && from.fill_buf().map_err(broken)?.first() == Some(&b'#') {
+            from.by_ref().take(HEAD_MOST).read_until(b'\n', &mut above).map_err(broken)?;
         }
-        let comments = String::from_utf8_lossy(&head).into_owned();
-        let hand = comments.lines().find_map(TakeHand::read).transpose()?;
-        let named =
-            |line: &str| Some(line.strip_prefix('#')?.trim_start().strip_prefix(INSTRUMENT)?.to_owned());
-        let instrument = comments.lines().find_map(named);
+        let comments = String::from_utf8_lossy(&above).into_owned();
+        let head = TakeHead::read(&comments)?;
         // The reader counts the lines.
-        let from = head.chain(from);
+        let from = above.chain(from);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
@@ -107,47 +104,83 @@ impl Take {
             }
             rows.push(row);
         }
-        if rows.is_empty() {
-            Err(TakeError::Empty)
-        } else {
-            Ok(Self { rows, hand, reed, has_one_reed, instrument })
-        }
+        if rows.is_empty() { Err(TakeError::Empty) } else { Ok(Self { rows, head, reed, has_one_reed }) }
     }
 }
 
-/// The comment that says which instrument was played, without its `#`.
-pub fn instrument_remark(name: &str) -> String {
-    format!("{INSTRUMENT}{name}")
+/// The value of `name=value` among words.
+fn value<'a>(words: &'a str, name: &str) -> Option<&'a str> {
+    words.split(' ').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='))
+}
+
+impl TakeHead {
+    /// The comments that say it, without their `#`.
+    pub fn remarks(&self) -> Vec<String> {
+        let Self { instrument, feel, hand, embouchure } = self;
+        [
+            instrument.as_ref().map(|name| format!("{INSTRUMENT}{name}")),
+            feel.as_ref().map(|flags| format!("feel {flags}")),
+            hand.as_ref().map(TakeHand::remark),
+            embouchure.as_ref().map(TakeEmbouchure::remark),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    /// Reads the comments above the columns. The error names the first that is wrong.
+    fn read(comments: &str) -> Result<Self, TakeError> {
+        let mut head = Self::default();
+        for line in comments.lines() {
+            let Some(said) = line.strip_prefix('#').map(str::trim) else { continue };
+            let wrong = || TakeError::Comment(line.to_owned());
+            if let Some(name) = said.strip_prefix(INSTRUMENT) {
+                head.instrument = Some(name.to_owned());
+            } else if said.starts_with(FEEL) {
+                head.feel = said.strip_prefix("feel ").map(str::to_owned);
+            } else if said.starts_with(HAND) {
+                head.hand = Some(TakeHand::read(said).ok_or_else(wrong)?);
+            } else if said.starts_with(REED) {
+                head.embouchure = Some(TakeEmbouchure::read(said).ok_or_else(wrong)?);
+            }
+        }
+        Ok(head)
+    }
 }
 
 impl TakeHand {
-    /// The comment that says it, without its `#`.
-    pub fn remark(&self) -> String {
+    fn remark(&self) -> String {
         let KnobDesign { zero_deg, full_deg, curve, dead_on_deg, dead_off_deg } = self.design;
         let feels = self.feels;
         format!(
-            "{HAND}zero_deg={zero_deg} full_deg={full_deg} curve={curve} dead_on_deg={dead_on_deg} \
+            "{HAND}{zero_deg} full_deg={full_deg} curve={curve} dead_on_deg={dead_on_deg} \
              dead_off_deg={dead_off_deg} feels={feels}"
         )
     }
 
-    /// Reads a line, if it is that comment.
-    fn read(line: &str) -> Option<Result<Self, TakeError>> {
-        let said = line.strip_prefix('#')?.trim_start().strip_prefix(HAND)?;
-        let value = |name: &str| said.split(' ').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='));
-        let number = |name| value(name)?.parse::<f64>().ok();
-        let read = || {
-            let design = KnobDesign {
-                zero_deg: number("zero_deg")?,
-                full_deg: number("full_deg")?,
-                curve: number("curve")?,
-                dead_on_deg: number("dead_on_deg")?,
-                dead_off_deg: number("dead_off_deg")?,
-            };
-            design.check().ok()?;
-            Some(Self { design, feels: value("feels")?.parse().ok()? })
+    fn read(said: &str) -> Option<Self> {
+        let number = |name| value(said, name)?.parse::<f64>().ok();
+        let design = KnobDesign {
+            zero_deg: number("zero_deg")?,
+            full_deg: number("full_deg")?,
+            curve: number("curve")?,
+            dead_on_deg: number("dead_on_deg")?,
+            dead_off_deg: number("dead_off_deg")?,
         };
-        Some(read().ok_or_else(|| TakeError::Hand(line.to_owned())))
+        design.check().ok()?;
+        Some(Self { design, feels: value(said, "feels")?.parse().ok()? })
+    }
+}
+
+impl TakeEmbouchure {
+    fn remark(&self) -> String {
+        let Self { zeta, strength, lip } = self;
+        format!("{REED}{zeta} strength={strength} lip={lip}")
+    }
+
+    fn read(said: &str) -> Option<Self> {
+        let number = |name| value(said, name)?.parse::<f32>().ok().filter(|number| number.is_finite());
+        Some(Self { zeta: number("zeta")?, strength: number("strength")?, lip: number("lip")? })
     }
 }
 
@@ -374,23 +407,31 @@ mod tests {
     }
 
     #[test]
-    fn a_take_says_how_its_angles_blow() {
+    fn a_take_says_what_was_played_and_felt() {
         let usual = KnobDesign::default();
         let design = KnobDesign { zero_deg: 40.5, full_deg: 400.0, curve: 2.0, ..usual };
-        let hand = TakeHand { design, feels: false };
-        let comments = ["C4".to_owned(), hand.remark(), instrument_remark("my #1")];
-        let mut writer = TakeWriter::new(Vec::new(), &comments).unwrap();
+        let head = TakeHead {
+            instrument: Some("my #1".to_owned()),
+            feel: Some("--law pressure --place 2".to_owned()),
+            hand: Some(TakeHand { design, feels: false }),
+            embouchure: Some(TakeEmbouchure { zeta: 0.3, strength: 2.5, lip: 1.1 }),
+        };
+        let mut writer = TakeWriter::new(Vec::new(), &head.remarks()).unwrap();
         for reed in [None, Some((2.0, 0.5)), Some((2.0, 0.5))] {
             writer.write(&TakeRow::default(), &TakeMarks { reed, ..TakeMarks::default() }).unwrap();
         }
         let take = Take::read(&*writer.into_inner()).unwrap();
-        assert_eq!((take.hand(usual), take.instrument()), (hand, Some("my #1")));
-        assert_eq!(take.reed(), Some(((2.0, 0.5), true)));
+        assert_eq!((take.head(), take.reed()), (&head, Some(((2.0, 0.5), true))));
         let two = read("t_us,angle_deg,h,k\n0,1,2,0.5\n1,1,3,0.5\n2,1,,\n").unwrap();
-        assert_eq!((two.reed(), two.instrument()), (Some(((2.0, 0.5), false)), None));
-        let silent = read("t_us,angle_deg\n0,1\n").unwrap();
-        assert_eq!(silent.hand(design), TakeHand { design, feels: true });
-        for wrong in [hand.remark().replace("curve=2", "curve=9"), "hand over".to_owned()] {
+        assert_eq!(
+            (two.reed(), two.hand(design)),
+            (Some(((2.0, 0.5), false)), TakeHand { design, feels: true })
+        );
+        // What people write, and what the plugin wrote before.
+        let words = "# feel FeelDesign { law: Flow }\n# hand over the knob\n# feel was odd\n";
+        assert_eq!(read(&format!("{words}t_us,angle_deg\n0,1\n")).unwrap().head(), &TakeHead::default());
+        let [hand, reed] = [&head.remarks()[2], &head.remarks()[3]];
+        for wrong in [hand.replace("curve=2", "curve=9"), reed.replace("lip=1.1", "lip=loose")] {
             let error = read(&format!("# {wrong}\nt_us,angle_deg\n0,1\n")).unwrap_err().to_string();
             assert!(error.contains(&wrong), "{error}");
         }

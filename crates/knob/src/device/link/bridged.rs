@@ -91,10 +91,11 @@ impl BridgedFeel {
         let Some(sender) = &mut self.sender else { return };
         match (feel, self.ceiling_mnm.or(session_mnm)) {
             (Some(feel), Some(ceiling_mnm)) => {
-                // Wall and slap are stiffnesses: only the knob can limit their torque.
-                let scale_mnm = feel.scale_mnm.min(f32::from(ceiling_mnm));
-                let [friction, detent] =
-                    [feel.friction, feel.detent].map(|tenths| tenths.min(ceiling_mnm.saturating_mul(10)));
+                // Together they stay under the ceiling. Wall and slap are stiffnesses: only the knob can limit their torque.
+                let friction = feel.friction.min(ceiling_mnm.saturating_mul(10));
+                let detent = feel.detent.min(ceiling_mnm.saturating_mul(10) - friction);
+                let left_mnm = f32::from(ceiling_mnm) - 0.1 * f32::from(friction + detent);
+                let scale_mnm = feel.scale_mnm.min(left_mnm);
                 sender.poll(&Feel { scale_mnm, friction, detent, ..*feel }, now_us);
             }
             _ => sender.rest(now_us),
@@ -177,17 +178,17 @@ mod tests {
         feels.poll(Some(&feel()), None, 1_000);
         let heard = bridge.heard();
         assert_eq!(heard.len(), 1);
-        assert!(heard[0].0 == 60.0 && heard[0].1 > 0.0, "the ceiling holds: {heard:?}");
+        assert!(heard[0].0 == 57.0 && heard[0].1 > 0.0, "the ceiling holds: {heard:?}");
         (bridge, feels)
     }
 
     #[test]
     fn a_lower_ceiling_holds_for_friction_and_mark_too() {
         let (bridge, mut feels) = armed();
-        feels.lower(1);
+        feels.lower(3);
         let bare = Feel { damping_mnms: 0.0, wall_mnm_per_deg: 0.0, slap_mnm_per_deg: 0.0, ..feel() };
         feels.poll(Some(&bare), None, 1_000_000);
-        assert_eq!(bridge.heard(), [(1.0, 2.0)], "friction 1 mNm and mark 1 mNm");
+        assert_eq!(bridge.heard(), [(0.0, 3.0)], "friction 2 mNm, mark 1 mNm");
     }
 
     #[test]
@@ -248,7 +249,7 @@ mod tests {
             feels.poll(Some(&feel()), ceiling, 1_000 * ms);
         }
         let scales: Vec<f32> = bridge.heard().iter().map(|(scale, _)| *scale).collect();
-        assert_eq!(scales, [50.0, 0.0]);
+        assert_eq!(scales, [47.0, 0.0], "beside friction and mark");
     }
 
     #[test]
