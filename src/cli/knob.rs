@@ -213,16 +213,11 @@ impl KnobCommand {
                 format!("{name}, serial number {serial}, firmware {major}.{minor}.{patch}, {armed}")
             }
         };
-        let settings = self.reed.settings();
         let head = TakeHead {
             instrument: Some(file.name.clone()),
             feel: Some(feel_flags::in_flags(design)),
             hand: Some(TakeHand { design: usual, feels: true }),
-            embouchure: Some(TakeEmbouchure {
-                zeta: settings.zeta,
-                strength: settings.strength,
-                lip: settings.lip,
-            }),
+            embouchure: Some(TakeEmbouchure::of(&self.reed.settings())),
         };
         let mut remarks = vec![
             format!(

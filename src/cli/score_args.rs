@@ -2,6 +2,7 @@
 
 mod breath_args;
 mod given;
+mod replay;
 
 use crate::cli::Failure;
 use crate::cli::controllers::{GivenMap, named_or_file, only_in_the_plugin, set_by_map};
@@ -13,12 +14,10 @@ use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
 use crate::cli::silent_keys::{hidden_in_chords, silent_notes};
 use crate::controllers::{ControllerMap, as_links};
-use crate::feel_flags;
 use crate::presets::{self, Preset};
 use crate::scale_file;
 use chalumeau_core::bore::fingering_finder;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::control::parts::Unplayed;
@@ -26,15 +25,13 @@ use chalumeau_core::event::{Event, PartEvent, Timed, To};
 use chalumeau_core::haptics::{FeelDesign, RequirementSolver};
 use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::instrument::key_pitches::{KeyPitches, TRIM_MOST_CENTS};
-use chalumeau_core::instrument::{BreathResponse, Model, Players, Settings, Split};
+use chalumeau_core::instrument::{BreathResponse, Players, Settings, Split};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::midi_file;
 use chalumeau_core::score::midi_file::Tracks;
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
-use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents};
-use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
-use chalumeau_knob::touch::take::{Take, TakeEmbouchure};
+use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -55,8 +52,6 @@ const MODELS_APART: f64 = 0.98;
 /// Gamma at which every note of a clarinet has begun, also under a firm lip (`chalumeau threshold --zeta 0.15`: 0.54 at most, less a fifth).
 const ALL_BEGIN: f64 = 0.5;
 
-/// By so much a take may be shorter than the piece without a word, s: the last note fades.
-const SHORT_TAKE_S: f64 = 1.0;
 /// By so much a breath may be longer than the piece without a word, s.
 const LEFT_OVER_S: f64 = 0.1;
 
@@ -147,17 +142,6 @@ fn trim(text: &str) -> Result<(u8, f64), String> {
     Ok((note(name)?, within(cents, -TRIM_MOST_CENTS, TRIM_MOST_CENTS)?))
 }
 
-/// The feel with which a take was recorded, if it says so.
-fn recorded_feel(take: &Take) -> Result<Option<FeelDesign>, Failure> {
-    let Some(flags) = &take.head().feel else { return Ok(None) };
-    let read = feel_flags::read(flags).map_err(|reason| {
-        Failure::Usage(format!(
-            "--replay: the take's line \"# feel {flags}\": {reason}; correct that line, or remove it"
-        ))
-    });
-    read.map(Some)
-}
-
 /// Which holes are open, by their names.
 fn open_holes(names: &str, file: &InstrumentFile) -> Result<Vec<bool>, Failure> {
     let mut open = vec![false; file.holes.len()];
@@ -174,9 +158,6 @@ fn open_holes(names: &str, file: &InstrumentFile) -> Result<Vec<bool>, Failure> 
     }
     Ok(open)
 }
-
-/// Reeds whose H and k differ by less are the same: takes have five decimals.
-const SAME_REED: f64 = 2e-5;
 
 /// Most players who hold keys at the same time, where the same instant is none.
 fn at_once(score: &Score<PartEvent>) -> usize {
@@ -306,47 +287,11 @@ impl ScoreArgs {
         warnings.extend(silent_notes(&parts.events, &unplayed, &model, settings.reach));
         warnings.extend(hidden_in_chords(&parts.events, &model, settings.reach));
         if let Some(take) = &take {
-            let piece_s = parts.samples as f64 / f64::from(self.rate);
-            if take.seconds() + SHORT_TAKE_S < piece_s {
-                warnings.push(format!(
-                    "the take ends after {:.1} s, and the piece after {piece_s:.1} s: the knob stays where the take leaves it",
-                    take.seconds()
-                ));
-            }
-            let design = self.feel_of(Some(take), &model.file)?;
-            match recorded_feel(take)? {
-                Some(recorded) if !feel_flags::map_alike(&recorded, &design) => warnings.push(format!(
-                    "the take was recorded with {}; the feel that you give turns its angles into other pressures",
-                    feel_flags::in_flags(&recorded)
-                )),
-                None if self.feel.given().is_none() => warnings.push(format!(
-                    "the take does not say its feel; it is replayed with {}",
-                    feel_flags::in_flags(&design)
-                )),
-                _ => {}
-            }
-            if let Some(name) = take.head().instrument.as_ref().filter(|name| **name != model.file.name) {
-                warnings.push(format!("the take was played on another instrument: {name}"));
-            }
-            let lip = TakeEmbouchure { zeta: settings.zeta, strength: settings.strength, lip: settings.lip };
-            if let Some(played) = take.head().embouchure.filter(|played| *played != lip) {
-                warnings.push(format!(
-                    "the take was played with --zeta {} --strength {} --lip {}; it is replayed with {}, {} and {}",
-                    played.zeta, played.strength, played.lip, lip.zeta, lip.strength, lip.lip
-                ));
-            }
-            let law = settings.reed_law();
-            if let Some(((h, k), is_one)) = take.reed()
-                && ((h - law.h()).abs().max((k - law.k()).abs()) > SAME_REED || !is_one)
-            {
-                let more = if is_one { "" } else { " at first, and with others" };
-                warnings.push(format!(
-                    "the take was played with H {h}, k {k}{more}; it is replayed with H {:.5}, k {:.5}",
-                    law.h(),
-                    law.k()
-                ));
-            }
-            parts.events = self.replayed(take, &model, &settings, &parts)?;
+            let design = replay::feel(&self.feel, Some(take), &model.file)?;
+            warnings.extend(replay::too_short(take, &parts, self.rate));
+            let is_given = self.feel.given().is_some();
+            warnings.extend(replay::differences(take, (&design, is_given), &model, &settings)?);
+            parts.events = replay::events(take, &design, &model, &settings, &parts, self.rate)?;
         }
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
@@ -463,14 +408,7 @@ impl ScoreArgs {
 
     /// The feel of the knob: where no flag says otherwise, the one with which the take was recorded that is replayed.
     pub fn feel(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
-        self.feel_of(self.breath.take()?.as_ref(), file)
-    }
-
-    fn feel_of(&self, take: Option<&Take>, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
-        match take.map(recorded_feel).transpose()?.flatten() {
-            Some(recorded) => self.feel.over(&recorded, file),
-            None => self.feel.design(file),
-        }
+        replay::feel(&self.feel, self.breath.take()?.as_ref(), file)
     }
 
     /// What is played, in a few words.
@@ -486,36 +424,6 @@ impl ScoreArgs {
             // clap asks for one of the four.
             (None, None, None, None) => String::new(),
         }
-    }
-
-    /// The events of a score with the breath of a take.
-    fn replayed(
-        &self,
-        take: &Take,
-        model: &Model,
-        settings: &Settings,
-        score: &Score<PartEvent>,
-    ) -> Result<Vec<Timed<PartEvent>>, Failure> {
-        let feels = InstrumentFeel::new(model);
-        let design = self.feel_of(Some(take), &model.file)?;
-        let table = feels.table(settings, &design, &NO_MOTOR)?;
-        let knob = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
-        let hand = take.mapping(feels.maps_for(&table, settings), knob);
-        let rate_hz = f64::from(self.rate);
-        let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
-        let mut blower = Blower::default();
-        blower.set_notes(settings.reach.key_notes(model));
-        let events = BlownEvents::new(
-            score.events.iter().copied(),
-            &mut blower,
-            &hand,
-            full_pa,
-            score.samples,
-            |at| Some(take.angle_deg(at as f64 / rate_hz)),
-            &mut |_, _| {},
-        )
-        .collect();
-        Ok(events)
     }
 
     fn score(

@@ -79,7 +79,7 @@ impl BreathView {
         if snapshot.sources.is_empty() {
             ui.label("No source has sent a value yet. Key velocity sets the mouth pressure.");
         }
-        // Under the meters, where the hand that has just plugged in a controller looks; not below all that it may turn later.
+        // Under the meters: who has just plugged in a controller looks there.
         if hands.step("resp") == PLAYED {
             self.calibrate_breath(ui, hands, snapshot);
         }

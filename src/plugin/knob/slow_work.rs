@@ -263,12 +263,11 @@ impl SlowWork {
 
     /// What a take that begins now says of itself.
     fn head(&self, settings: &Settings, status: Option<&LinkStatus>) -> TakeHead {
-        let &Settings { zeta, strength, lip, .. } = settings;
         TakeHead {
             instrument: self.instrument.current().map(|current| current.model.file.name.clone()),
             feel: self.shared.blown().map(|blown| feel_flags::in_flags(blown.design())),
             hand: Some(self.hand_of(status)),
-            embouchure: Some(TakeEmbouchure { zeta, strength, lip }),
+            embouchure: Some(TakeEmbouchure::of(settings)),
         }
     }
 

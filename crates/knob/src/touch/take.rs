@@ -6,6 +6,7 @@ use crate::touch::feel::PitchMaps;
 use crate::touch::heard::Heard;
 use crate::touch::study::{Condition, StudySide};
 use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_core::instrument::Settings;
 
 /// One row of a take: one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -57,6 +58,13 @@ pub struct TakeEmbouchure {
     pub strength: f32,
     /// Tip opening under the lip over the reference.
     pub lip: f32,
+}
+
+impl TakeEmbouchure {
+    /// That of these settings.
+    pub fn of(&Settings { zeta, strength, lip, .. }: &Settings) -> Self {
+        Self { zeta, strength, lip }
+    }
 }
 
 /// What a take says of itself above its columns; what it does not say is `None`.
