@@ -297,7 +297,8 @@ fn morph_never_changes_torque_faster_than_the_slew_limit() {
     println!("morph: {accepted} feels, steps up to {largest:.0} mNm, fastest {fastest:.1} mNm/s");
     assert!(accepted > 300 && largest > 200.0, "nothing was morphed");
     // Single precision adds and takes some 450 mNm: half an ulp each way, 2000 times a second.
-    assert!(fastest <= 5000.0 + 0.2, "{fastest} mNm/s");
+    // The thermal ceiling may sink meanwhile, by 100 mNm/s.
+    assert!(fastest <= 5000.0 + 100.0 + 0.2, "{fastest} mNm/s");
 }
 
 #[test]

@@ -459,8 +459,11 @@ CLAIM(rule_5_no_change_of_parameters_moves_torque_faster_than_5_nm_per_s) {
         const Curve curve(current);
         const float angle = bench.device.angle_deg();
         const float velocity = bench.device.velocity();
-        // The law's own change; where the ceiling cuts, less.
-        const float own = curve.torque(angle, velocity) - curve.torque(last_angle, last_velocity);
+        // The law's own change, as far as the ceiling lets it through.
+        const auto felt = [&](float at, float moving) {
+            return std::max(-450.0F, std::min(450.0F, curve.torque(at, moving)));
+        };
+        const float own = felt(angle, velocity) - felt(last_angle, last_velocity);
         const bool cut = std::fabs(torque) > 449.9F || std::fabs(last) > 449.9F;
         if (!cut) {
             worst = std::max(worst, std::fabs(torque - last - own));
@@ -520,6 +523,30 @@ CLAIM(rule_5_repeating_a_feel_does_not_prolong_the_change_to_it) {
     bench.feel(feel);
     bench.run(1800);
     CHECK((bench.state.flags & flag::MORPHING) == 0 && std::fabs(bench.run(1) + 60.0F) < 0.1F);
+}
+
+CLAIM(rule_5_a_wall_beyond_the_ceiling_is_gone_in_morph_ms) {
+    // A hand leans through the wall: the law asks for thousands of mNm, and the hand feels the ceiling of 100.
+    Bench bench;
+    Feel feel = held_feel();
+    feel.wall_deg = 400.0F;
+    bench.ready(feel, 10800, 100);
+    CHECK(std::fabs(bench.run(50) + 100.0F) < 1e-2F);
+    Feel none = feel;
+    none.law = static_cast<std::uint8_t>(Law::Free);
+    none.morph_ms = 20;
+    bench.feel(none);
+    CHECK(std::fabs(bench.run(42)) < 1e-3F);
+    // And back, without a step.
+    feel.morph_ms = 20;
+    bench.feel(feel);
+    float last = 0.0F;
+    for (int i = 0; i < 42; ++i) {
+        const float torque = bench.run(1);
+        CHECK(std::fabs(torque - last) < 2.6F);
+        last = torque;
+    }
+    CHECK(std::fabs(last + 100.0F) < 1e-2F);
 }
 
 CLAIM(rule_6_a_refused_feel_leaves_the_one_before_and_says_why) {

@@ -221,47 +221,46 @@ pub fn stop(hands: &mut Hands, actions: &mut Vec<Action>) {
     hands.put("arm", 0.0);
 }
 
-/// The large button that arms, and stops what is armed; and the ceiling of the torque.
+/// The button that arms and the one that stops, and the ceiling of the torque. They stand apart, so that no hand that stops the knob twice
+/// arms it.
 fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
     let c = Colours::here(ui);
     let knob = &snapshot.knob;
     let is_wanted = hands.step("arm") == 1;
-    let (title, line, fill, ink): (&str, &str, Color32, Color32) = match (knob.is_armed, is_wanted) {
-        (true, _) => ("STOP", "armed: press, or Escape", c.danger, c.panel),
-        (false, true) => ("DISARMED", "disarmed by the knob: press, then arm again", c.raised, c.beats),
-        (false, false) if knob.is_live => ("ARM", "lets the knob make torque", c.accent, c.on_accent),
-        (false, false) => ("ARM", "no knob connected", c.raised, c.quiet),
-    };
+    let is_held = knob.is_armed || knob.is_arming || is_wanted;
     let has_line = ui.available_height() > 160.0;
     let height = (ui.available_height() - if has_line { 118.0 } else { 66.0 }).clamp(42.0, 84.0);
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
-    let painter = ui.painter();
-    let round = CornerRadius::same(theme::PANEL_RADIUS);
-    let fill = if response.hovered() { fill.lerp_to_gamma(c.ink, 0.10) } else { fill };
-    painter.rect(rect, round, fill, Stroke::new(1.0, c.line), egui::StrokeKind::Inside);
-    if response.has_focus() {
-        painter.rect_stroke(rect.shrink(2.0), round, Stroke::new(2.0, c.ink), egui::StrokeKind::Inside);
-    }
-    let is_low = height < 60.0;
-    let mut words = LayoutJob::simple(line.to_owned(), theme::small(), ink, rect.width() - 12.0);
-    words.halign = Align::Center;
-    let words = painter.layout_job(words);
-    let title_height = if is_low { 22.0 } else { 28.0 };
-    let top = rect.center().y - 0.5 * (title_height + words.size().y);
-    let size = if words.rows.len() > 1 && is_low { 14.0 } else { 0.86 * title_height };
-    let at = pos2(rect.center().x, top + 0.5 * title_height);
-    painter.text(at, Align2::CENTER_CENTER, title, FontId::proportional(size), ink);
-    painter.galley(pos2(rect.center().x, top + title_height), words, ink);
-    let name = if is_wanted || knob.is_armed { "Stop the knob" } else { "Arm the knob" };
-    response.widget_info(|| WidgetInfo::selected(Role::Switch, true, knob.is_armed, name));
-    if response.clicked() {
-        if is_wanted || knob.is_armed {
-            stop(hands, actions);
-        } else {
+    let line = match (knob.is_armed, is_wanted || knob.is_arming, knob.is_live) {
+        (true, _, _) => "armed",
+        (false, true, true) => "may turn a little",
+        (false, _, true) => "allows torque",
+        (false, _, false) => "no knob connected",
+    };
+    let (fill, ink) = match (is_held, knob.is_live) {
+        (false, true) => (c.accent, c.on_accent),
+        (true, _) | (_, false) => (c.raised, c.quiet),
+    };
+    ui.horizontal_top(|ui| {
+        ui.spacing_mut().item_spacing.x = GAP;
+        let size = vec2(0.5 * (ui.available_width() - GAP), height);
+        let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+        face(ui, rect, &response, ("ARM", line), (fill, ink));
+        response.widget_info(|| WidgetInfo::selected(Role::Switch, !is_held, knob.is_armed, "Arm the knob"));
+        if response.clicked() && !is_held {
             hands.put("arm", 1.0);
         }
-    }
-    response.on_hover_ui(|ui| teach(ui, "arm", ""));
+        response.on_hover_ui(|ui| teach(ui, "arm", ""));
+
+        let (fill, ink) = if is_held { (c.danger, c.panel) } else { (c.raised, c.danger) };
+        // It acts when it is pressed: a hasty hand slips, and a frightened one does not let go.
+        let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+        face(ui, rect, &response, ("STOP", "or Escape"), (fill, ink));
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Stop the knob"));
+        let is_pressed = response.is_pointer_button_down_on() && ui.input(|i| i.pointer.any_pressed());
+        if is_pressed || response.clicked() || is_held && response.is_pointer_button_down_on() {
+            stop(hands, actions);
+        }
+    });
     slider(ui, hands, "ceil");
     ui.spacing_mut().item_spacing.y = 2.0;
     let quiet = |text: String| RichText::new(text).font(theme::small()).color(c.quiet);
@@ -283,6 +282,38 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec
     let echo = knob.round_trip_us.map_or_else(|| "?".into(), |us| format!("{:.1} ms", late(us)));
     let errors = knob.lost + knob.damaged;
     ui.label(quiet(format!("new feel after {echo}; {errors} line errors, {} disconnects", knob.losses)));
+}
+
+/// A large button: a word, and a line that says what it does.
+fn face(
+    ui: &Ui,
+    rect: egui::Rect,
+    response: &egui::Response,
+    (title, line): (&str, &str),
+    (fill, ink): (Color32, Color32),
+) {
+    let c = Colours::here(ui);
+    let painter = ui.painter();
+    let round = CornerRadius::same(theme::PANEL_RADIUS);
+    let fill = if response.hovered() { fill.lerp_to_gamma(c.ink, 0.10) } else { fill };
+    painter.rect(rect, round, fill, Stroke::new(1.0, c.line), egui::StrokeKind::Inside);
+    if response.has_focus() {
+        painter.rect_stroke(rect.shrink(2.0), round, Stroke::new(2.0, c.ink), egui::StrokeKind::Inside);
+    }
+    let is_low = rect.height() < 60.0;
+    let mut words = LayoutJob::simple(line.to_owned(), theme::small(), ink, rect.width() - 12.0);
+    words.halign = Align::Center;
+    let words = painter.layout_job(words);
+    // A low button has room for one line.
+    let is_told = !is_low || words.rows.len() == 1;
+    let title_height = if is_low { 22.0 } else { 28.0 };
+    let top = rect.center().y - 0.5 * (title_height + if is_told { words.size().y } else { 0.0 });
+    let at = pos2(rect.center().x, top + 0.5 * title_height);
+    painter.text(at, Align2::CENTER_CENTER, title, FontId::proportional(0.86 * title_height), ink);
+    if !is_told {
+        return;
+    }
+    painter.galley(pos2(rect.center().x, top + title_height), words, ink);
 }
 
 /// Quality of the connection to the knob.

@@ -373,11 +373,13 @@ pub struct KnobState {
     pub is_live: bool,
     /// It makes torque.
     pub is_armed: bool,
+    /// It has been told to arm, and may turn a little to test its signs.
+    pub is_arming: bool,
     /// Most torque the last arming allowed, mNm.
     pub ceiling_mnm: f32,
     /// Position, degrees.
     pub angle_deg: Option<f32>,
-    /// Torque at that position by the law it follows, mNm.
+    /// Torque that it reports, mNm; positive resists.
     pub torque_mnm: Option<f32>,
     /// What the knob says of faults, or why something did not happen.
     pub notice: Option<String>,

@@ -354,25 +354,61 @@ fn holes_are_tried_and_given_back() {
 }
 
 #[test]
-fn the_knob_is_armed_by_the_large_button_alone() {
+fn the_knob_is_armed_and_stopped_by_large_buttons_that_stand_apart() {
     let mut window = Window::tall(Tab::Knob);
     window.snapshot.borrow_mut().knob.is_armed = false;
     window.harness.run();
     click(&mut window, "Arm the knob");
     assert_eq!(window.host.value("arm"), 1.0);
+    assert!(window.harness.get_by_label("Arm the knob").accesskit_node().is_disabled());
     window.snapshot.borrow_mut().knob.is_armed = true;
     window.harness.run();
+    let stops = |actions: Vec<Action>| !actions.is_empty() && actions.iter().all(|a| *a == Action::StopKnob);
     click(&mut window, "Stop the knob");
     assert_eq!(window.host.value("arm"), 0.0);
-    assert_eq!(window.actions(), [Action::StopKnob]);
-    // Undo takes back no arming.
-    assert!(window.harness.get_by_label("Undo").accesskit_node().is_disabled());
-    // A knob that let go by itself: the first press takes the wish back.
-    window.host.automate("arm", 1.0);
+    assert!(stops(window.actions()));
+    // Another press stops once more, and arms nothing.
     window.snapshot.borrow_mut().knob.is_armed = false;
     window.harness.run();
     click(&mut window, "Stop the knob");
     assert_eq!(window.host.value("arm"), 0.0);
+    assert!(stops(window.actions()));
+    // Undo takes back no arming.
+    assert!(window.harness.get_by_label("Undo").accesskit_node().is_disabled());
+    // A knob that let go by itself: a press takes the wish back.
+    window.host.automate("arm", 1.0);
+    window.harness.run();
+    click(&mut window, "Stop the knob");
+    assert_eq!(window.host.value("arm"), 0.0);
+}
+
+#[test]
+fn stop_acts_when_it_is_pressed_even_if_the_pointer_slips_and_while_the_knob_is_still_arming() {
+    for is_arming in [false, true] {
+        let mut window = Window::tall(Tab::Knob);
+        window.host.automate("arm", 1.0);
+        let knob = (!is_arming, is_arming);
+        (window.snapshot.borrow_mut().knob.is_armed, window.snapshot.borrow_mut().knob.is_arming) = knob;
+        window.harness.run();
+        window.actions();
+        let at = window.harness.get_by_label("Stop the knob").rect().center();
+        let press = |pressed, pos| egui::Event::PointerButton {
+            pos,
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers: egui::Modifiers::NONE,
+        };
+        window.harness.event(egui::Event::PointerMoved(at));
+        window.harness.event(press(true, at));
+        window.harness.step();
+        assert_eq!(window.host.value("arm"), 0.0);
+        assert!(window.actions().contains(&Action::StopKnob), "arming: {is_arming}");
+        let slipped = at + egui::vec2(40.0, 30.0);
+        window.harness.event(egui::Event::PointerMoved(slipped));
+        window.harness.event(press(false, slipped));
+        window.harness.run();
+        assert_eq!(window.host.value("arm"), 0.0);
+    }
 }
 
 #[test]

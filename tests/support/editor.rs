@@ -360,6 +360,7 @@ fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
         text: "Chalumeau sim 5eed0001 (firmware 0.3.0) at /dev/pts/3".into(),
         is_live: true,
         is_armed: true,
+        is_arming: false,
         ceiling_mnm: 100.0,
         angle_deg,
         torque_mnm,

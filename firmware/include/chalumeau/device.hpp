@@ -261,8 +261,8 @@ class Device {
         if (session_.phase() == Phase::Probing) {
             return probe(dt_s);
         }
-        const float wanted = curve_.torque(encoder_.degrees(), encoder_.velocity()) + owed;
-        if (!is_finite(wanted)) {
+        const float law = curve_.torque(encoder_.degrees(), encoder_.velocity());
+        if (!is_finite(law + owed)) {
             // Nothing to fade from.
             not_finite_ = true;
             stand(Cause::NotFinite, true, 0.0F);
@@ -270,10 +270,10 @@ class Device {
             released(Cause::NotFinite);
             return 0.0F;
         }
-        const float allowed = limits_.clamp(wanted, dt_s);
+        const float allowed = limits_.clamp(law, owed, dt_s);
         if (limits_.limited() && session_.gain() >= 1.0F && clock_us_ - limit_told_us_ > LIMIT_EVENT_US) {
             limit_told_us_ = clock_us_;
-            send_event(EventKind::Limit, 0, wanted);
+            send_event(EventKind::Limit, 0, law + owed);
         }
         return allowed * session_.gain();
     }
@@ -281,7 +281,7 @@ class Device {
     /// The sign probe's torque of this tick, mNm, until it has found something.
     float probe(float dt_s) {
         switch (probe_.tick(encoder_, dt_s)) {
-            case Finding::Probing: return limits_.clamp(probe_.torque_mnm(), dt_s);
+            case Finding::Probing: return limits_.clamp(probe_.torque_mnm(), 0.0F, dt_s);
             case Finding::Right: session_.probed(); break;
             case Finding::Reversed: fail(Cause::Sign); break;
             case Finding::SpeedReversed: fail(Cause::Speed); break;
@@ -404,11 +404,11 @@ class Device {
     void adopt(const Feel& feel) {
         const float angle = encoder_.degrees();
         const float velocity = encoder_.velocity();
-        const float before = curve_.torque(angle, velocity);
+        const float before = limits_.cut(curve_.torque(angle, velocity));
         curve_ = Curve(feel);
         feel_ = feel;
         if (session_.phase() != Phase::Disarmed) {
-            morph_.begin(before, curve_.torque(angle, velocity), feel.morph_ms);
+            morph_.begin(before, limits_.cut(curve_.torque(angle, velocity)), feel.morph_ms);
         }
     }
 

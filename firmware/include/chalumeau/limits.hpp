@@ -38,12 +38,20 @@ class Limits {
     /// The soft start takes care of the rise.
     void arm(float user_mnm) { user_ = now_ = least(user_mnm, device_); }
 
-    /// The torque allowed of the torque wanted, mNm. Call once per tick, with the motor's share of it.
-    float clamp(float wanted, float dt_s) {
+    /// The torque allowed, mNm, of a law's torque and of what is owed to the hand. Call once per tick. The law is cut before it is
+    /// added, too: the hand has never felt more of it than this, so that is all a change of parameters owes.
+    float clamp(float law, float owed, float dt_s) {
         now_ = least(user_, now_ + SLEW_MNM_PER_S * dt_s);
+        const float wanted = cut(law) + owed;
+        const float allowed = cut(wanted);
+        limited_ = cut(law) != law || allowed != wanted;
+        return allowed;
+    }
+
+    /// As much of a torque as the present ceiling allows, mNm.
+    float cut(float torque) const {
         const float ceiling = ceiling_mnm();
-        limited_ = wanted > ceiling || wanted < -ceiling;
-        return wanted > ceiling ? ceiling : (wanted < -ceiling ? -ceiling : wanted);
+        return torque > ceiling ? ceiling : (torque < -ceiling ? -ceiling : torque);
     }
 
     /// What was really commanded heats the motor.

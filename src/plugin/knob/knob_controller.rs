@@ -3,6 +3,7 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, mpsc};
+use std::time::{Duration, Instant};
 
 use super::SharedKnob;
 use super::calibrator::{Calibrator, Reading};
@@ -19,6 +20,10 @@ use chalumeau_knob::touch::take::TakeRow;
 
 /// Who carries out the switches, in "... has stood still".
 const SWITCHES: &str = "the plugin's thread for the knob's switches";
+
+/// How the text begins that counts the rows of a take, and how often it is told.
+const RECORDING: &str = "recording";
+const COUNT_EVERY: Duration = Duration::from_secs(1);
 
 /// The state of the controller's thread.
 pub struct KnobController {
@@ -39,6 +44,9 @@ pub struct KnobController {
     angles: (mpsc::Sender<Reading>, mpsc::Receiver<Reading>),
     switches: KnobSwitches,
     calibrator: Calibrator,
+    /// What was logged last, and when rows of a take were counted last.
+    logged: String,
+    counted: Option<Instant>,
 }
 
 impl KnobController {
@@ -64,6 +72,8 @@ impl KnobController {
             angles: mpsc::channel(),
             switches: KnobSwitches::default(),
             calibrator: Calibrator::new(),
+            logged: String::new(),
+            counted: None,
         }
     }
 
@@ -234,11 +244,11 @@ impl KnobController {
     }
 
     /// Shows *Knob status*, and logs it if it is new.
-    fn report(&self, status: Option<&LinkStatus>) {
+    fn report(&mut self, status: Option<&LinkStatus>) {
         let mut words = vec![status.map_or_else(|| "off".to_owned(), |status| status.text.clone())];
         let work = self.shared.work_texts();
         if let Some(rows) = work.rows {
-            words.push(format!("recording, {rows} rows"));
+            words.push(format!("{RECORDING}, {rows} rows"));
         }
         let hint = self.switches.hint().cloned();
         words.extend([hint, work.refused, work.short_breath, work.take].into_iter().flatten());
@@ -246,11 +256,22 @@ impl KnobController {
             let texts = [&status.alarm, &status.restriction, &status.last_refusal, &status.notice];
             words.extend(texts.into_iter().flatten().cloned());
         }
+        // Rows come a hundred times a second: they are told once a second, and are nothing for a log.
+        let news =
+            words.iter().filter(|word| !word.starts_with(RECORDING)).cloned().collect::<Vec<_>>().join("; ");
+        let is_new = self.logged != news;
+        if !is_new && self.counted.is_some_and(|at| at.elapsed() < COUNT_EVERY) {
+            return;
+        }
+        self.counted = Some(Instant::now());
+        if is_new {
+            nice_plug::prelude::nice_log!("knob: {news}");
+            self.logged = news;
+        }
         let text = words.join("; ");
         if let Ok(mut shown) = self.params.knob_status.write()
             && *shown != text
         {
-            nice_plug::prelude::nice_log!("knob: {text}");
             *shown = text;
             drop(shown);
             self.params.host.text_changed();

@@ -13,8 +13,8 @@ use crate::plugin::params::moment::{Moment, Moments};
 use chalumeau_knob::device::{KnobLink, LinkStatus, Phase};
 
 /// How long *Arm* must have been off beside a live knob before switching it on arms. A project or a host that sets
-/// switches while it loads is not an act of the user.
-const ARM_AFTER: Duration = Duration::from_millis(500);
+/// switches while it loads is not an act of the user, and a second press at once after a stop wants no torque.
+const ARM_AFTER: Duration = Duration::from_secs(1);
 /// How long a knob may take to arm. The link repeats the message for 0.2 s (`device/session/arming.rs`).
 const ARM_WITHIN: Duration = Duration::from_secs(2);
 
@@ -85,8 +85,11 @@ impl KnobSwitches {
             let port = now.feel_port;
             link.feel_osc((port > 0).then(|| SocketAddr::from((Ipv4Addr::LOCALHOST, port))));
         }
-        if self.was_armed && !status.armed && now.arm {
-            self.set_hint("disarmed: switch Arm on again".to_owned());
+        if self.was_armed && !status.armed {
+            self.off_since = None;
+            if now.arm {
+                self.set_hint("disarmed: switch Arm on again".to_owned());
+            }
         }
         self.was_armed = status.armed;
         if moments.take(Moment::TakeOver) {
@@ -155,7 +158,8 @@ impl KnobSwitches {
                 self.hint = None;
             }
         } else if is_pressed {
-            self.set_hint("not armed: wait for the knob, then switch Arm on".to_owned());
+            self.off_since = None;
+            self.set_hint("not armed: wait a second, then switch Arm on".to_owned());
         } else if !now.arm && before.arm {
             link.disarm();
             if status.armed {

@@ -35,8 +35,6 @@ use chalumeau_core::instrument::{KeyPitches, Settings};
 use chalumeau_core::units::Air;
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::{LinkStatus, Phase, RuntimeDir};
-#[cfg(feature = "devices")]
-use chalumeau_knob::wire::message::Feel;
 
 /// Time from one snapshot to the next while something moves.
 const MOVING: Duration = Duration::from_millis(33);
@@ -215,10 +213,7 @@ impl SnapshotThread {
     fn show_knob(&mut self, snapshot: &mut Snapshot) {
         let status = self.handles.knob.status();
         self.find_devices(status.as_ref());
-        snapshot.knob = status.map_or_else(KnobState::default, |status| {
-            let feel = snapshot.feel.as_ref().ok().map(|note| note.feel);
-            knob_view(&status, feel.as_ref())
-        });
+        snapshot.knob = status.map_or_else(KnobState::default, |status| knob_view(&status));
         snapshot.knob.devices = self.devices.0.clone();
     }
 
@@ -374,21 +369,17 @@ fn source_views(sources: &BreathSources, is_held: bool) -> Vec<BreathSource> {
 
 /// The knob as the window shows it, without the list of devices.
 #[cfg(feature = "devices")]
-fn knob_view(status: &LinkStatus, feel: Option<&Feel>) -> KnobState {
+fn knob_view(status: &LinkStatus) -> KnobState {
     let stats = &status.stats;
     KnobState {
         devices: Vec::new(),
         text: status.text.clone(),
         is_live: status.phase == Phase::Live,
         is_armed: status.armed,
+        is_arming: status.arming,
         ceiling_mnm: f32::from(status.ceiling_mnm),
         angle_deg: status.angle_deg,
-        torque_mnm: status.angle_deg.zip(feel).map(|(angle_deg, feel)| {
-            let tables = chalumeau_core::reed::ReedTables::reference();
-            let torque_mnm =
-                chalumeau_core::haptics::torque_law::torque_mnm(feel, tables, f64::from(angle_deg));
-            if status.armed { torque_mnm as f32 } else { 0.0 }
-        }),
+        torque_mnm: status.torque_mnm.map(|mnm| -mnm),
         notice: [&status.alarm, &status.last_refusal, &status.notice, &status.restriction]
             .into_iter()
             .find_map(Clone::clone),

@@ -541,6 +541,9 @@ impl HostSession {
         // Without a STATE there is nothing that a permission could answer.
         let stamp = self.state().map(|state| Stamp { epoch: state.epoch.unwrap_or(0), heard_us: state.t_us });
         let arm = Arm { session: self.number, ceiling_mnm: self.arming.ceiling_mnm(), stamp };
+        // Torque that nobody wants has no ceiling to play with, should FREE be lost.
+        let ceiling_mnm = if self.arming.is_wanted() { arm.ceiling_mnm } else { 0 };
+        let alive = Arm { ceiling_mnm, ..arm };
         let waits = self.arming.is_wanted() && (self.zeroing.is_pending() || !self.is_dated);
         let epoch = self.state().and_then(|state| state.epoch);
         match if waits { None } else { self.arming.poll(now_us, epoch) } {
@@ -553,7 +556,7 @@ impl HostSession {
             let period_us = if self.binding == Binding::Midi { ALIVE_MIDI_US } else { ALIVE_US };
             // Counted from when it was due, so that the rate holds; after a stall from now.
             self.next_alive_us = (self.next_alive_us + period_us).max(now_us);
-            return Some(Message::Alive(arm));
+            return Some(Message::Alive(alive));
         }
         if self.info.is_none() || !self.is_heard(now_us) {
             let is_framed = self.wire_stats().frames > 0;

@@ -9,6 +9,7 @@ use crate::device::feel_osc::FeelSender;
 use crate::device::heartbeat::{OBEDIENCE_US, Pulse};
 use crate::device::session::arming::{HARD_CEILING_MNM, OFFERED_CEILING_MNM};
 use crate::wire::Feel;
+use chalumeau_core::haptics::feel_parameters::TorqueLaw;
 
 /// What people must know while torque goes this way.
 const WARNING: &str = "the torque goes through the bridge: if this program ends, the bridge takes it away after 3 s; if the \
@@ -60,6 +61,8 @@ impl BridgedFeel {
     ) -> Result<(), String> {
         let no_bridge = self.sender.is_none().then(|| NO_BRIDGE.to_owned());
         if let Some(why) = no_bridge.or_else(|| reason(pulse, is_heard, now_us)) {
+            // A stop that came meanwhile holds for what was armed before, too.
+            self.ceiling_mnm = None;
             return Err(format!("not armed: {why}"));
         }
         let most_mnm = if further_act { HARD_CEILING_MNM } else { OFFERED_CEILING_MNM };
@@ -95,11 +98,19 @@ impl BridgedFeel {
                 let friction = feel.friction.min(ceiling_mnm.saturating_mul(10));
                 let detent = feel.detent.min(ceiling_mnm.saturating_mul(10) - friction);
                 let left_mnm = f32::from(ceiling_mnm) - 0.1 * f32::from(friction + detent);
-                let scale_mnm = feel.scale_mnm.min(left_mnm);
+                let scale_mnm = feel.scale_mnm.min(left_mnm / peak(feel));
                 sender.poll(&Feel { scale_mnm, friction, detent, ..*feel }, now_us);
             }
             _ => sender.rest(now_us),
         }
+    }
+}
+
+/// Largest torque of a law, over its scale; 1 or more. Firmware that does not know H and k has 1.
+fn peak(feel: &Feel) -> f32 {
+    match feel.law {
+        TorqueLaw::Flow => (4.0 * feel.h.powi(3) * feel.k / 27.0).sqrt().max(1.0),
+        TorqueLaw::Free | TorqueLaw::Pressure => 1.0,
     }
 }
 

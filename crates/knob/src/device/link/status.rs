@@ -131,6 +131,8 @@ pub struct LinkStatus {
     pub restriction: Option<String>,
     /// Position as it came last, degrees.
     pub angle_deg: Option<f32>,
+    /// Torque that it reports after all its limits, mNm, negative against the breath; `None` from a knob that does not tell.
+    pub torque_mnm: Option<f32>,
     /// The knob's button is down.
     pub button: bool,
     /// The line runs at 115200 baud.

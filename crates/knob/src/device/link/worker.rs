@@ -544,6 +544,7 @@ impl Worker {
             None => lost.unwrap_or_else(|| self.trouble.clone()),
             Some(connection) => {
                 status.angle_deg = connection.last().map(|state| state.angle_deg);
+                status.torque_mnm = connection.last().and_then(|state| state.torque_mnm);
                 status.button = connection.button();
                 status.notice =
                     connection.stock_notice().or_else(|| self.bridged.notice().map(str::to_owned));

@@ -150,7 +150,9 @@ impl Arming {
         epoch: Option<u16>,
         now_us: i64,
     ) -> Option<ArmingEnd> {
-        let was_armed = std::mem::replace(&mut self.is_armed, is_armed);
+        // A probe that nobody wants any more is told FREE like torque.
+        let makes_torque = is_armed || is_probing && self.want == Goal::Free;
+        let was_armed = std::mem::replace(&mut self.is_armed, makes_torque);
         match self.want {
             Goal::Arming { epoch: first @ Some(_), .. } if epoch != first => {
                 self.give_up();
