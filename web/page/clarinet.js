@@ -66,9 +66,10 @@ export class ClarinetDrawing {
 
   /** What sounds now: index of the fingering, level in dBFS, breath 0..1. */
   follow(fingering, level, breath) {
-    this.fingering = fingering;
-    this.loudness = clamp((level - DIM_DB) / (BRIGHT_DB - DIM_DB), 0, 1);
-    this.breath = breath;
+    const loudness = clamp((level - DIM_DB) / (BRIGHT_DB - DIM_DB), 0, 1);
+    // At rest nothing is drawn again.
+    if (fingering === this.fingering && loudness === this.loudness && breath === this.breath) return;
+    Object.assign(this, { fingering, loudness, breath });
     this.wake();
   }
 

@@ -17,6 +17,8 @@ const NAMES = {
 };
 /** Angle from one end to the other, degrees; pixels of a hand's way. */
 const [SWEEP, WAY] = [270, 180];
+/** A notch of a wheel, in pixels and in lines. */
+const [WHEEL_PIXELS, WHEEL_LINES] = [100, 3];
 
 const svg = (name, attributes) => {
   const element = document.createElementNS('http://www.w3.org/2000/svg', name);
@@ -63,8 +65,12 @@ export class Control {
     element.addEventListener('dblclick', () => this.change(of.default));
     element.addEventListener('keydown', (event) => this.key(event));
     element.addEventListener('wheel', (event) => {
+      // A pinch zooms, a sideways swipe is none of this, and a page that scrolls is scrolled.
+      const root = document.documentElement;
+      if (event.ctrlKey || event.deltaY === 0 || root.scrollHeight > root.clientHeight) return;
       event.preventDefault();
-      this.nudge(-0.02 * Math.sign(event.deltaY));
+      const lines = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY / WHEEL_PIXELS : event.deltaY / WHEEL_LINES;
+      this.nudge(-0.02 * clamp(lines, -1, 1));
     }, { passive: false });
     this.show();
   }

@@ -64,6 +64,8 @@ export class Engine {
   /** Called in a gesture of the user: browsers let a page sound only then. Where they do not, this may wait for ever. */
   async start() {
     this.wanted = true;
+    // On a telephone, an instrument sounds even where its ringing is muted.
+    if (navigator.audioSession) navigator.audioSession.type = this.stream ? 'play-and-record' : 'playback';
     if (this.context && !this.isRunning) await this.context.resume();
   }
 

@@ -58,7 +58,7 @@ export class Holes {
 
   /** Another instrument: `built` is what the page knows of it, `base` what a question to the workshop names it by. */
   setInstrument(built, base) {
-    Object.assign(this, { built, base, moved: [], undo: [], chosen: null, held: null, version: this.version + 1 });
+    Object.assign(this, { built, base, moved: [], undo: [], chosen: null, held: null, version: this.version + 1, file: null });
     clearTimeout(this.fitting);
     this.workshop.long?.end();
     get('hole').replaceChildren(...built.holes.map(({ name, says }, at) => new Option(says || name.replaceAll('_', ' '), at)));
@@ -116,7 +116,8 @@ export class Holes {
       get('hole-width').title = `As built: ${(2e3 * built.r).toFixed(1)} mm`;
     }
     get('hole-undo').disabled = this.undo.length === 0;
-    get('hole-back').disabled = get('hole-save').disabled = this.moved.length === 0;
+    get('hole-back').disabled = this.moved.length === 0;
+    get('hole-save').disabled = !this.file;
   }
 
   down(event) {
@@ -218,6 +219,8 @@ export class Holes {
   put(moved) {
     this.moved = moved;
     this.version += 1;
+    // What can be saved is the answer to this question.
+    this.file = null;
     this.draw();
     clearTimeout(this.fitting);
     if (moved.length === 0) {
@@ -256,7 +259,7 @@ export class Holes {
 
   async hearFitted() {
     const { version, base } = this;
-    this.state('Fitting the bore …');
+    this.state('Computing the exact pitch …');
     try {
       const told = await this.workshop.askLong({ do: 'move', fit: true, ...this.question() });
       if (version === this.version && base === this.base) this.take(told, true, true);
@@ -273,7 +276,7 @@ export class Holes {
     // The fit was quicker than the answer before it.
     if (!isFitted && isLatest && this.fittedVersion === this.version) return;
     if (isFitted) this.fittedVersion = this.version;
-    this.file = file;
+    if (isLatest) this.file = file;
     this.engine.send({ prepared: { file: bytes(file), prepared: bytes(prepared) } });
     this.on({ heard: { isFitted, file, prepared } });
     if (!isLatest) return;
@@ -283,7 +286,7 @@ export class Holes {
       return { ...moved, x_m: x, radius_m: r };
     });
     this.draw();
-    this.state(isFitted ? 'Exact' : 'Right to some 10 cents; fitting the bore …');
+    this.state(isFitted ? 'Exact' : 'Pitch within about 10 cents; computing the exact pitch …');
   }
 
   /** What a worker has prepared does not fit the sound. */

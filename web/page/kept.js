@@ -2,7 +2,28 @@
 
 const NAME = 'chalumeau';
 
+const within = (value, least, most) => typeof value === 'number' && value >= least && value <= most;
+
+function found() {
+  try {
+    return JSON.parse(localStorage.getItem(NAME)) ?? {};
+  } catch {
+    // As if there were nothing.
+    return {};
+  }
+}
+
 export const Kept = {
+  /** The volume, 0..100, if it was ever set. */
+  volume() {
+    const { volume } = found();
+    return within(volume, 0, 100) ? volume : undefined;
+  },
+
+  keepVolume(volume) {
+    Kept.write({ ...found(), volume });
+  },
+
   write(state) {
     try {
       localStorage.setItem(NAME, JSON.stringify(state));
@@ -13,15 +34,8 @@ export const Kept = {
 
   /** As far as it fits `data`: places of preset and instrument, pairs of a control and its value, holes, volume. */
   read(data) {
-    let found;
-    try {
-      found = JSON.parse(localStorage.getItem(NAME));
-    } catch {
-      // As if there were nothing.
-    }
-    const state = found ?? {};
+    const state = found();
     const place = (all, fits) => (all.findIndex(fits) < 0 ? undefined : all.findIndex(fits));
-    const within = (value, least, most) => typeof value === 'number' && value >= least && value <= most;
     const instrument = place(data.instruments, ({ id }) => id === state.instrument);
     const { length, holes } = data.instruments[instrument] ?? { holes: [] };
     const fits = (hole) => holes.some(({ name }) => name === hole?.name) && within(hole.x_m, data.holes.least_x, length) && within(hole.radius_m, ...data.holes.radius);

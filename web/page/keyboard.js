@@ -90,7 +90,14 @@ export class Keyboard {
   /** The key that sounds. */
   mark(note) {
     this.keys.get(this.sounding)?.classList.remove('down');
+    const isNew = note !== this.sounding;
     this.sounding = note;
+    if (isNew && note !== undefined && this.touches.size === 0 && !this.keys.has(note)) {
+      // What sounds from elsewhere is seen, too.
+      this.from = note - 5;
+      this.build();
+      return;
+    }
     this.keys.get(note)?.classList.add('down');
   }
 

@@ -1,8 +1,11 @@
 // The listening page: each sound is made by the module when it is first asked for, much faster than it sounds, and drawn.
 
+import { Kept } from './kept.js';
 import { json } from './names.js';
 import { compiled, whySilent } from './sound.js';
 
+/** Time in which a sound that is stopped fades, s. */
+const FADE_S = 0.02;
 /** Columns of a picture. */
 const COLUMNS = 360;
 const get = (id) => document.getElementById(id);
@@ -14,6 +17,7 @@ const silent = whySilent();
 if (silent) get('trouble').textContent = `No sound: ${silent}.`;
 let module;
 let context;
+let loudness;
 let playing;
 /** Which of the clicks is the latest. */
 let clicks = 0;
@@ -67,19 +71,43 @@ async function toggle(stop, button, picture) {
   if (click !== clicks) return;
   button.classList.remove('making');
   const source = new AudioBufferSourceNode(context, { buffer: stop.sound });
-  source.connect(context.destination);
-  const own = (playing = { stop, button, source, began: context.currentTime });
+  const gain = new GainNode(context, { gain: 1 });
+  source.connect(gain).connect(volume());
+  const own = (playing = { stop, button, source, gain, began: context.currentTime });
   source.onended = () => playing === own && end();
   source.start();
   button.setAttribute('aria-pressed', 'true');
   follow(own, picture);
 }
 
+/** The volume of the page that plays; here it can be set, too. */
+function volume() {
+  if (!loudness) {
+    loudness = new GainNode(context, { gain: gainOf(get('volume').value) });
+    loudness.connect(context.destination);
+  }
+  return loudness;
+}
+
+/** As the page that plays has it: the ear hears the square. */
+function gainOf(percent) {
+  return (percent / 100) ** 2 * 1.25;
+}
+
+get('volume').value = Kept.volume() ?? get('volume').value;
+get('volume').oninput = ({ target }) => {
+  loudness?.gain.setTargetAtTime(gainOf(target.value), context.currentTime, 0.015);
+  Kept.keepVolume(Number(target.value));
+};
+addEventListener('keydown', ({ key }) => key === 'Escape' && end());
+
 function end() {
   if (!playing) return;
-  const { source, button } = playing;
+  const { source, button, gain } = playing;
   playing = null;
-  source.stop();
+  // Not in the middle of a wave.
+  gain.gain.setTargetAtTime(0, context.currentTime, FADE_S / 4);
+  source.stop(context.currentTime + FADE_S);
   button.setAttribute('aria-pressed', 'false');
 }
 
@@ -91,7 +119,11 @@ async function made({ samples, messages }) {
   const processorOptions = { module, instrument: 0, score: { score: messages } };
   const node = new AudioWorkletNode(offline, 'chalumeau', { outputChannelCount: [2], processorOptions });
   node.connect(offline.destination);
-  return offline.startRendering();
+  const failed = new Promise((_, reject) => {
+    node.port.onmessage = ({ data }) => data.failed && reject(new Error(data.failed));
+    node.onprocessorerror = () => reject(new Error('the sound could not be computed'));
+  });
+  return Promise.race([offline.startRendering(), failed]);
 }
 
 /** Draws the sound, and how much of it has been heard. */

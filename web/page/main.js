@@ -31,6 +31,8 @@ const KNOB = 'the knob';
 /** Controllers of MIDI that blow. */
 const BLOWING = ['CC2', 'CC11', 'channel pressure'];
 const LOADING = 'Loading …';
+/** Without a mouse, a browser switches the sound on when the first finger is lifted. */
+const HAS_MOUSE = !matchMedia('(hover: none)').matches;
 const IDLE = 'Press a key, or drag across the clarinet. To blow, press Blow.';
 const CHOOSE = 'Choose a note: press a key, or drag across the clarinet.';
 
@@ -41,7 +43,7 @@ const get = (id) => document.getElementById(id);
 const hint = new Hint(get('hint'), usual);
 let values = [];
 /** The sound is there; it should be on and is not. */
-let [isPrepared, isLate, waking] = [false, false, 0];
+let [isPrepared, isLate, waking, isTouching] = [false, false, 0, false];
 /** What the microphone hears, and where the breath comes from, by the latest picture; whether anything has been played. */
 let [room, origin, hasPlayed] = [null, '', false];
 const data = await json('data.json').catch((error) => {
@@ -58,6 +60,11 @@ const drag = new Drag(get('clarinet'), hands, breathe, (touches) => {
 });
 const typing = new Typing(hands, breathe, (said) => {
   if (said.letters) keyboard.setLetters(said.letters);
+  if (said.help) tellKeys(said.help);
+  if (said.outside !== undefined) {
+    const end = said.outside < typing.first ? ['begins', typing.first] : ['ends', typing.last];
+    say(`${instrument.name} ${end[0]} at ${noteName(end[1] + instrument.transposition)}, written.`);
+  }
   if (said.base) keyboard.show(said.base);
   if (said.breath !== undefined) meter.mark(said.breath);
   if (said.start) {
@@ -68,7 +75,7 @@ const typing = new Typing(hands, breathe, (said) => {
     hands.silence();
     knob.stop();
   }
-});
+}, () => meter.isPhysical ? [0, 1] : data.struck.dynamic);
 const controls = data.controls.map((of) => new Control(of, (place, value) => {
   values[place] = value;
   engine.send({ set: [place, value] });
@@ -99,7 +106,8 @@ get('lower').onclick = () => keyboard.shift(-1);
 get('higher').onclick = () => keyboard.shift(1);
 get('volume').oninput = (event) => {
   engine.setVolume(event.target.value / 100);
-  keep();
+  // Alone: another tab may have kept another preset meanwhile.
+  Kept.keepVolume(Number(event.target.value));
 };
 get('volume').onchange = (event) => leaveAfterPointer(event.target);
 restore();
@@ -107,6 +115,8 @@ engine.setVolume(get('volume').value / 100);
 hint.tell();
 
 for (const type of ['pointerdown', 'pointerup', 'keydown']) addEventListener(type, begin, { capture: true });
+addEventListener('pointerdown', ({ pointerType }) => (isTouching = pointerType === 'touch'), { capture: true });
+for (const type of ['pointerup', 'pointercancel']) addEventListener(type, () => (isTouching = false), { capture: true });
 // What comes up elsewhere is not told.
 addEventListener('blur', letGo);
 addEventListener('pagehide', hide);
@@ -115,6 +125,12 @@ document.addEventListener('visibilitychange', () => document.hidden && hide());
 function letGo() {
   [typing, drag, keyboard].forEach((part) => part.end());
   holes.held = null;
+}
+
+/** Which letters play, as this keyboard has them. */
+function tellKeys({ first, last, down, up }) {
+  [['key-first', first], ['key-last', last], ['key-down', down], ['key-up', up]].forEach(([id, letter]) => (get(id).textContent = letter));
+  get('keyboard').setAttribute('aria-label', `Clarinet. The keys from ${first} to ${last} play, ${down} and ${up} change the octave, the arrows up and down the breath; Escape is silence.`);
 }
 
 /** A page that nobody sees holds no key. */
@@ -162,6 +178,8 @@ function restore() {
 
 function begin() {
   lastHeard = performance.now();
+  // Whether it helps is told in a while.
+  isLate = false;
   engine.start().catch(fail);
   watch();
 }
@@ -191,13 +209,14 @@ function say(text) {
 function usual() {
   if (!isPrepared) return LOADING;
   if (isLate) {
+    if (isTouching) return 'Lift your finger: then the sound is on.';
     return navigator.userActivation?.hasBeenActive === false
-      ? 'Click once to switch the sound on.'
-      : 'The browser does not switch the sound on. Click once; if that does not help, is there a loudspeaker?';
+      ? `${HAS_MOUSE ? 'Click' : 'Tap'} once to switch the sound on.`
+      : `The browser does not switch the sound on. ${HAS_MOUSE ? 'Click' : 'Tap'} once; if that does not help, is there a loudspeaker?`;
   }
   if (room?.calibrating) return 'Measuring the room for two seconds. Please be quiet …';
   if ((room || knob.plays) && !hands.hasNote) return CHOOSE;
-  if (room) return 'Blow at the microphone. A key or a drag chooses the note.';
+  if (room) return 'Blow at the microphone as if to cool a spoon, with headphones on. A key or a drag chooses the note.';
   if (knob.plays) return 'Turn the knob to blow. A key or a drag chooses the note.';
   return hasPlayed || holes.isOpen ? '' : IDLE;
 }
@@ -289,7 +308,11 @@ function choose(preset) {
 
 /** What the worklet tells. */
 function hear(message) {
-  if ('state' in message) watch();
+  if ('state' in message) {
+    watch();
+    // What stands still moves no picture.
+    if (!engine.isRunning) drawing.follow(drawing.fingering, -120, 0);
+  }
   if (message.failed) fail(message.failed);
   if (message.taken === false) holes.refuse();
   if (message.microphoneGone && blowing) {
@@ -360,7 +383,7 @@ async function toggleMicrophone() {
       begin();
       await engine.openMicrophone();
     } catch (error) {
-      say(isForbidden(error) ? 'The browser was not allowed to use the microphone.' : `No microphone: ${error.message}`);
+      say(isForbidden(error) ? 'The microphone is blocked for this page. Allow it in the browser’s settings for this site, then press Blow again.' : error.name === 'NotFoundError' ? 'No microphone was found. Plug one in, and press Blow again.' : `No microphone: ${error.message}`);
       return;
     } finally {
       isOpening = false;
@@ -390,8 +413,13 @@ const midi = new Midi(hands, (message) => engine.send(message), ({ inputs, messa
   }
   if (message) begin();
 });
-const openMidi = () => midi.open().catch((error) => say(isForbidden(error) ? 'The browser was not allowed to use MIDI.' : `No MIDI: ${error.message}`));
-get('midi').onclick = openMidi;
+const openMidi = () => midi.open().catch((error) => say(isForbidden(error) ? 'MIDI is blocked for this page. Allow it in the browser’s settings for this site, then press MIDI again.' : `No MIDI: ${error.message}`));
+get('midi').onclick = () => {
+  if (get('midi').getAttribute('aria-pressed') !== 'true') return openMidi();
+  midi.close();
+  get('midi').setAttribute('aria-pressed', 'false');
+  get('midi').title = '';
+};
 get('midi').hidden = !Midi.isHere;
 // Where it has been allowed before, nobody needs to ask again.
 navigator.permissions?.query({ name: 'midi' }).then(({ state }) => state === 'granted' && Midi.isHere && openMidi(), () => {});

@@ -38,6 +38,16 @@ export class Midi {
     this.listen();
   }
 
+  /** No device plays any more. */
+  close() {
+    [...this.inputs.keys()].forEach((input) => this.leave(input));
+    this.inputs.clear();
+    if (!this.access) return;
+    this.access.onstatechange = null;
+    for (const input of this.access.inputs.values()) input.onmidimessage = null;
+    this.access = null;
+  }
+
   /** This page plays, and no other. */
   claim() {
     this.plays = true;

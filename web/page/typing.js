@@ -12,14 +12,17 @@ const OPEN_LIST = CSS.supports('selector(:open)') ? 'select:open' : 'select';
 
 export class Typing {
   /** `on` gets { letters }, { start }, { silence } and { breath }, which the arrows have set for the keys to come; `breathe` the breath that the arrows set, or null. */
-  constructor(hands, breathe, on) {
-    Object.assign(this, { hands, breathe, on, held: new Map(), base: 60, breath: BEGIN });
+  constructor(hands, breathe, on, struck) {
+    Object.assign(this, { hands, breathe, on, struck, held: new Map(), learnt: new Map(), base: 60, breath: BEGIN });
     addEventListener('keydown', (event) => this.down(event));
     addEventListener('keyup', (event) => {
       // macOS tells of no key that comes up while Command is down.
       if (event.key === 'Meta') this.end();
       else this.up(event.code);
     });
+    // A list that opens takes the keys that come up.
+    addEventListener('pointerdown', ({ target }) => target.closest?.('select') && this.end(), { capture: true });
+    addEventListener('focusin', ({ target }) => target.matches?.('select') && this.end());
     navigator.keyboard?.getLayoutMap?.().then((map) => {
       this.layout = map;
       this.tell();
@@ -38,8 +41,9 @@ export class Typing {
 
   tell() {
     const usual = { Semicolon: ';', Quote: "'" };
-    const letter = (code) => (this.layout?.get(code) ?? usual[code] ?? code.slice(3)).toUpperCase();
-    this.on({ letters: new Map(CODES.map((code, n) => [this.base + n, letter(code)])), base: this.base });
+    const letter = (code) => (this.layout?.get(code) ?? this.learnt.get(code) ?? usual[code] ?? code.slice(3)).toUpperCase();
+    const [first, last, down, up] = ['KeyA', 'Quote', 'KeyZ', 'KeyX'].map(letter);
+    this.on({ letters: new Map(CODES.map((code, n) => [this.base + n, letter(code)])), base: this.base, help: { first, last, down, up } });
   }
 
   down(event) {
@@ -47,12 +51,13 @@ export class Typing {
     if (event.code === 'Escape') return this.on({ silence: true });
     if (event.target.matches?.(OPEN_LIST)) return;
     const onControl = event.target.matches?.('[role=slider], input, select');
+    this.learn(event);
     const place = CODES.indexOf(event.code);
     if (place >= 0) {
       event.preventDefault();
       if (event.repeat || this.held.has(event.code)) return;
       const note = this.base + place;
-      if (note < this.first || note > this.last) return;
+      if (note < this.first || note > this.last) return this.on({ outside: note });
       this.held.set(event.code, note);
       this.on({ start: true });
       this.hands.press(note, Math.round(127 * this.breath), event.code);
@@ -62,8 +67,17 @@ export class Typing {
       event.preventDefault();
       this.breath = clamp(this.breath + (event.code === 'ArrowUp' ? STEP : -STEP), 0.06, 1);
       this.on({ breath: this.breath });
-      if (this.held.size > 0) this.breathe(this.breath);
+      // As loud as a key that is struck so: down and up again is where it was.
+      const [soft, loud] = this.struck();
+      if (this.held.size > 0) this.breathe(soft + (loud - soft) * this.breath);
     }
+  }
+
+  /** Where the browser does not tell the layout, keys tell their letters as they are pressed. */
+  learn({ code, key }) {
+    if (this.layout || key.length !== 1 || this.learnt.get(code) === key || !(CODES.includes(code) || code === 'KeyZ' || code === 'KeyX')) return;
+    this.learnt.set(code, key);
+    this.tell();
   }
 
   /** Lets every key go. */

@@ -13,6 +13,7 @@ use chalumeau_core::control::wind::{WindCoeffs, WindDesign, WindMeter};
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::instrument::stereo::Stereo;
 use chalumeau_core::instrument::{BuildError, Channels, Ensemble, Preparation, Settings, Wanted};
+use chalumeau_core::maths;
 
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::{KnobDesign, slap_strength};
@@ -74,6 +75,52 @@ pub struct Playing {
     is_heard: bool,
     input: [f32; MOST_FRAMES],
     wind_picture: [f32; WIND_PICTURE],
+    /// The last samples of the instrument, before pan and room.
+    last: [f32; 2],
+    takeover: Takeover,
+}
+
+/// Time in which a new instrument becomes as loud as it is, s. Its bore begins empty under the full breath, which is a pop.
+const FADE_IN_S: f64 = 0.025;
+/// Time constant with which the last sample of the one before goes to 0, s.
+const FADE_OUT_S: f64 = 0.001;
+
+/// One instrument takes over from another without a click.
+struct Takeover {
+    /// Samples since then, and in which the new one fades in.
+    played: usize,
+    fade: usize,
+    /// What is left of the last samples of the one before, and its share after each sample.
+    rest: [f32; 2],
+    share: f32,
+}
+
+impl Takeover {
+    fn done(rate_hz: f64) -> Self {
+        let fade = (FADE_IN_S * rate_hz) as usize;
+        let share = maths::exp(-1.0 / (FADE_OUT_S * rate_hz)) as f32;
+        Self { played: fade, fade, rest: [0.0; 2], share }
+    }
+
+    fn begin(&mut self, last: [f32; 2]) {
+        (self.played, self.rest) = (0, last);
+    }
+
+    fn fade(&mut self, left: &mut [f32], right: &mut [f32]) {
+        for (left, right) in left.iter_mut().zip(right) {
+            if self.played >= self.fade {
+                return;
+            }
+            // Flat at both ends, and near nothing in the first 5 ms.
+            let way = self.played as f32 / self.fade as f32;
+            let gain = (way * way * (3.0 - 2.0 * way)).powi(2);
+            for (sample, rest) in [left, right].into_iter().zip(&mut self.rest) {
+                *rest *= self.share;
+                *sample = gain * *sample + *rest;
+            }
+            self.played += 1;
+        }
+    }
 }
 
 /// Applies what a message became, in its order.
@@ -126,6 +173,8 @@ impl Playing {
             is_heard: false,
             input: [0.0; MOST_FRAMES],
             wind_picture: [0.0; WIND_PICTURE],
+            last: [0.0; 2],
+            takeover: Takeover::done(rate_hz),
         }
     }
 
@@ -292,6 +341,7 @@ impl Playing {
         self.settle();
         self.ensemble.carry_on(&from.ensemble);
         (self.wind, self.is_heard) = (from.wind, from.is_heard);
+        self.takeover.begin(from.last);
     }
 
     /// Makes the next samples, [`MOST_FRAMES`] at most; returns how many.
@@ -333,6 +383,10 @@ impl Playing {
             None => self.ensemble.render_channels(Channels::two(left, right)),
         }
         self.blower.advance(frames);
+        self.takeover.fade(left, right);
+        if let (Some(&left), Some(&right)) = (left.last(), right.last()) {
+            self.last = [left, right];
+        }
         self.stereo.pan(left, right);
         for channel in [left, right] {
             for sample in channel {

@@ -356,3 +356,31 @@ fn another_instrument_takes_over_the_note() {
     let picture = after.picture();
     assert!(right > 0.01 && left < 1e-3 && picture[0] == 60.0, "{left} {right} {picture:?}");
 }
+
+#[test]
+fn another_instrument_takes_over_without_a_pop_or_a_step() {
+    for velocity in [20, 100] {
+        let mut before = Playing::new(48_000.0, Bundled::BFlat).unwrap();
+        before.midi(0x90, 60, velocity);
+        let mut samples = Vec::new();
+        for _ in 0..200 {
+            let frames = before.process(MOST_FRAMES);
+            samples.extend_from_slice(&before.channel(0)[..frames]);
+        }
+        let held = &samples[samples.len() - 4_800..];
+        let peak = held.iter().fold(0.0_f32, |most, sample| most.max(sample.abs()));
+        let step = held.windows(2).fold(0.0_f32, |most, pair| most.max((pair[1] - pair[0]).abs()));
+        let mut all = vec![samples[samples.len() - 1]];
+        let mut after = Playing::new(48_000.0, Bundled::A).unwrap();
+        after.carry_on(before);
+        // The same note on another clarinet: it begins anew, and no louder.
+        for _ in 0..200 {
+            let frames = after.process(MOST_FRAMES);
+            all.extend_from_slice(&after.channel(0)[..frames]);
+        }
+        let found = all.iter().fold(0.0_f32, |most, sample| most.max(sample.abs()));
+        let steps = all.windows(2).fold(0.0_f32, |most, pair| most.max((pair[1] - pair[0]).abs()));
+        println!("velocity {velocity}: peak {peak:.3}, then {found:.3}; step {step:.4}, then {steps:.4}");
+        assert!(found < 1.3 * peak && steps < 2.0 * step, "{velocity}: {found} of {peak}, {steps} of {step}");
+    }
+}

@@ -97,7 +97,7 @@ const SILENCE = {
   },
 
   async 'MIDI that is not allowed is told from MIDI that does not work'(browser) {
-    const cases = [['NotAllowedError', /not allowed to use MIDI/], ['SecurityError', /not allowed to use MIDI/], ['InvalidStateError', /^No MIDI: no driver/]];
+    const cases = [['NotAllowedError', /MIDI is blocked/], ['SecurityError', /MIDI is blocked/], ['InvalidStateError', /^No MIDI: no driver/]];
     for (const [name, words] of cases) {
       const before = `navigator.requestMIDIAccess = async () => { throw new DOMException('no driver', '${name}') }`;
       const opened = await open(browser, server.address, { before, ...PLAIN });
