@@ -67,7 +67,7 @@ use chalumeau_knob::touch::take_csv::TakeError;
 use clap::{Parser, Subcommand};
 use std::ffi::{OsStr, OsString};
 use std::fmt;
-use std::io::{self, Write};
+use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -274,10 +274,7 @@ pub fn main() -> ExitCode {
         Command::Radiation(command) => command.run(),
         Command::Bore(command) => command.run(),
         Command::Instrument(command) => {
-            return match command.run() {
-                Ok(code) => code,
-                Err(failure) => failed(&failure),
-            };
+            return command.run().unwrap_or_else(|failure| failed(&failure));
         }
         Command::Threshold(command) => command.run(),
         Command::Fingerings(command) => command.run(),
@@ -296,7 +293,9 @@ pub fn main() -> ExitCode {
         Command::KnobSim(command) => command.run(),
         Command::Haptic(command) => command.run(),
         #[cfg(feature = "devices")]
-        Command::Doctor(command) => command.run(),
+        Command::Doctor(command) => {
+            return command.run().unwrap_or_else(|failure| failed(&failure));
+        }
     };
     match done {
         Err(failure) => failed(&failure),
@@ -325,6 +324,5 @@ fn say_line(text: fmt::Arguments) {
     if let Some(listener) = LISTENER.get() {
         return listener(&text.to_string());
     }
-    // In one piece, beside other programs that write there.
-    let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
+    crate::stderr::line(text);
 }

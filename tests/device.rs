@@ -894,31 +894,31 @@ fn over_midi_frames_leave_20_ms_between_them() {
 }
 
 /// What `chalumeau doctor` prints, with what is told to it by the environment and its arguments.
-fn doctor(directory: &TempDir, args: &[&str]) -> String {
+fn doctor(directory: &TempDir, args: &[&str], code: i32) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_chalumeau"))
         .env("CHALUMEAU_RUNTIME_DIR", directory.path())
         .arg("doctor")
         .args(args)
         .output()
         .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(code), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
 #[test]
 fn doctor_tells_what_answers_and_what_to_do_when_nothing_does() {
     let (directory, places) = places();
-    let nothing = doctor(&directory, &["--seconds", "1"]);
+    let nothing = doctor(&directory, &["--seconds", "1"], 1);
     for say in ["Serial ports", "MIDI ports", "No knob answers", "chalumeau knob-sim", "docs/touch.md"] {
         assert!(nothing.contains(say), "{say:?} in {nothing}");
     }
-    let missing = doctor(&directory, &["--path", "/dev/not-there"]);
+    let missing = doctor(&directory, &["--path", "/dev/not-there"], 1);
     assert!(missing.contains("/dev/not-there is not there: is the knob plugged in?"), "{missing}");
-    let silence = doctor(&directory, &["--osc", &free_port().to_string(), "--seconds", "1"]);
+    let silence = doctor(&directory, &["--osc", &free_port().to_string(), "--seconds", "1"], 1);
     assert!(silence.contains("nothing received") && silence.contains("192.168.4.2"), "{silence}");
 
     let knob = PtyKnob::plug(Some(&places), &Setup::default());
-    let found = doctor(&directory, &["--seconds", "2"]);
+    let found = doctor(&directory, &["--seconds", "2"], 0);
     for say in [
         "simulated: test, 000000005eed0001",
         "Chalumeau sim",
@@ -935,6 +935,6 @@ fn doctor_tells_what_answers_and_what_to_do_when_nothing_does() {
     println!("{found}");
     let owner = linked(&places, "Track 1", any_serial());
     live(&owner);
-    let held = doctor(&directory, &["--path", knob.path.to_str().unwrap()]);
+    let held = doctor(&directory, &["--path", knob.path.to_str().unwrap()], 1);
     assert!(held.contains("in use by Track 1"), "{held}");
 }

@@ -7,7 +7,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use std::collections::BTreeMap;
 use std::process::Command;
 
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 13] = [
     "written_midi",
     "gamma_on",
     "gamma_off",
@@ -20,6 +20,7 @@ const COLUMNS: [&str; 12] = [
     "k",
     "gamma_sounding",
     "wall_deg",
+    "most_mnm",
 ];
 /// The reference note, which Contrast and Place do not change: C5.
 const REFERENCE_NOTE: u8 = 72;

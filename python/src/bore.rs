@@ -120,9 +120,13 @@ pub fn thresholds<'py>(
         PyArray1::from_iter(py, notes.iter().map(move |note| note.as_ref().map_or(f64::NAN, of)))
     };
     let columns = PyDict::new(py);
-    columns.set_item("written_midi", PyArray1::from_iter(py, bore.written().map(|written| written.0)))?;
+    columns.set_item(
+        "written_midi",
+        PyArray1::from_iter(py, bore.written().map(|written| i64::from(written.0))),
+    )?;
     columns.set_item("gamma_on", column(|note| note.gamma_on))?;
     columns.set_item("gamma_sounding", column(|note| note.gamma_sounding))?;
+    columns.set_item("gamma_own", column(|note| note.gamma_own.unwrap_or(f64::NAN)))?;
     columns.set_item("gamma_beat", column(|note| note.gamma_beat))?;
     columns.set_item("gamma_off", column(|note| note.gamma_off))?;
     columns.set_item("p_req_pa", column(|note| note.p_req_pa))?;
@@ -164,14 +168,14 @@ pub fn bifurcation<'py>(
     let all = || found.up.iter().chain(&found.down);
     let changes = found.transitions();
     let columns = PyDict::new(py);
-    let ways = std::iter::repeat_n(1_i8, found.up.len()).chain(std::iter::repeat_n(-1, found.down.len()));
+    let ways = std::iter::repeat_n(1_i64, found.up.len()).chain(std::iter::repeat_n(-1, found.down.len()));
     columns.set_item("direction", PyArray1::from_iter(py, ways))?;
     columns.set_item("gamma", PyArray1::from_iter(py, all().map(|point| point.gamma)))?;
     columns.set_item("rms", PyArray1::from_iter(py, all().map(|point| point.rms)))?;
     columns.set_item("shut", PyArray1::from_iter(py, all().map(|point| point.shut)))?;
     columns.set_item("own", PyArray1::from_iter(py, all().map(|point| point.own)))?;
     columns.set_item("begins", changes.begins)?;
-    columns.set_item("beats", changes.beats)?;
+    columns.set_item("shuts", changes.shuts)?;
     columns.set_item("chokes", changes.chokes)?;
     columns.set_item("returns", changes.returns)?;
     columns.set_item("opens", changes.opens)?;
@@ -200,7 +204,8 @@ pub fn feel<'py>(
     instrument: &Instrument,
     written: u8,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let NoteFeel { feel, landmarks, .. } = feel_of(py, &pairs, instrument, written)?;
+    let found = feel_of(py, &pairs, instrument, written)?;
+    let NoteFeel { feel, landmarks, .. } = found;
     let dict = PyDict::new(py);
     let law = match feel.law {
         TorqueLaw::Free => "free",
@@ -224,6 +229,7 @@ pub fn feel<'py>(
     ] {
         dict.set_item(name, value)?;
     }
+    dict.set_item("most_mnm", found.most_mnm())?;
     dict.set_item("a_on_deg", landmarks.a_on_deg)?;
     dict.set_item("a_beat_deg", landmarks.a_beat_deg)?;
     dict.set_item("a_close_deg", landmarks.a_close_deg)?;

@@ -8,19 +8,33 @@ use std::cell::Cell;
 use std::fmt::Display;
 
 /// What the command line advises, and the same for Python.
-const ADVICE: [(&str, &str); 3] = [
+const ADVICE: [(&str, &str); 6] = [
     ("`chalumeau presets list` lists", "chalumeau.presets() lists"),
     (
         "`chalumeau render --help` and `chalumeau parameters` list",
         "help(chalumeau.render) and chalumeau.parameters() list",
     ),
     ("`chalumeau parameters` lists", "chalumeau.parameters() lists"),
+    ("--set beyond=octave plays", "beyond=\"octave\" plays"),
+    ("--players 2 or more play", "players=2 or more play"),
+    ("--untuned plays", "untuned=True plays"),
 ];
+
+/// Where neither a score nor a note is given.
+const NOTHING_TO_PLAY: &str = "nothing to play: give written=\"C4\" or sounding=58 for a note, scale=\"E3:C6\", a MIDI file or a list of notes";
 
 /// A `ValueError` with this text.
 pub fn wrong(what: impl Display) -> PyErr {
-    let text = ADVICE.iter().fold(what.to_string(), |text, (of_shell, ours)| text.replace(of_shell, ours));
+    let text = advised(&what.to_string());
     PyValueError::new_err(in_another_case(&text).unwrap_or(text))
+}
+
+/// A text of the command line as Python has it.
+pub fn advised(text: &str) -> String {
+    if text.contains("required arguments were not provided") && text.contains("--scale") {
+        return NOTHING_TO_PLAY.to_owned();
+    }
+    ADVICE.iter().fold(text.to_owned(), |text, (of_shell, ours)| text.replace(of_shell, ours))
 }
 
 thread_local! {
@@ -45,13 +59,27 @@ pub fn watched<T, E: Display>(work: impl FnOnce(fn() -> bool) -> Result<T, E>) -
 pub fn warn(said: &str) {
     let said = ["note: ", "warning: "].iter().find_map(|mark| said.strip_prefix(mark)).unwrap_or(said);
     let warned = Python::attach(|py| {
-        // Of the line that called the package.
-        let stacklevel = [("stacklevel", 2)].into_py_dict(py)?;
-        py.import("warnings")?.call_method("warn", (said,), Some(&stacklevel)).map(drop)
+        let stacklevel = [("stacklevel", 1 + frames_within(py)?)].into_py_dict(py)?;
+        py.import("warnings")?.call_method("warn", (advised(said),), Some(&stacklevel)).map(drop)
     });
     if let Err(raised) = warned {
         RAISED.set(Some(raised));
     }
+}
+
+/// How many calls of the package stand between the user's line and this code.
+fn frames_within(py: Python<'_>) -> PyResult<usize> {
+    let mut frame = py.import("sys")?.call_method1("_getframe", (0,))?;
+    let mut count = 0;
+    while !frame.is_none() {
+        let module: String = frame.getattr("f_globals")?.get_item("__name__")?.extract()?;
+        if module != "chalumeau" && !module.starts_with("chalumeau.") {
+            break;
+        }
+        count += 1;
+        frame = frame.getattr("f_back")?;
+    }
+    Ok(count)
 }
 
 /// Where a name that is unknown differs from a flag by its case alone (h, H), that flag is meant.

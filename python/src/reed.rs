@@ -14,7 +14,7 @@ pub fn reed_tables(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     dict.set_item("p", PyArray1::from_slice(py, &tables.x[..]))?;
     dict.set_item("x_a", PyArray1::from_slice(py, &tables.x_a[..]))?;
     dict.set_item("x_b", PyArray1::from_slice(py, &tables.x_b[..]))?;
-    dict.set_item("sgn", PyArray1::from_slice(py, &tables.sgn[..]))?;
+    dict.set_item("sgn", PyArray1::from_iter(py, tables.sgn.iter().map(|&sign| i64::from(sign))))?;
     Ok(dict)
 }
 

@@ -1,7 +1,7 @@
 //! Rendering: what `chalumeau render` plays, into an array.
 
 use crate::instrument::Instrument;
-use crate::mistakes::{signals, watched, wrong};
+use crate::mistakes::{advised, signals, watched, wrong};
 use chalumeau::cli::offline::{self, Given, TimedNote};
 use chalumeau_core::units::SoundingNote;
 use numpy::{PyArray1, PyArrayMethods};
@@ -98,6 +98,7 @@ pub fn render<'py>(
     }
     dict.set_item("rate_hz", rate)?;
     dict.set_item("wanted_hz", wanted_hz)?;
+    let warnings: Vec<_> = warnings.iter().map(|said| advised(said)).collect();
     dict.set_item("warnings", warnings)?;
     dict.set_item("resets", resets)?;
     Ok(dict)

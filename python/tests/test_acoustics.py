@@ -43,6 +43,11 @@ def test_thresholds_are_those_of_the_command_line(table):
     assert list(found["written_midi"]) == said["written_midi"]
     for name, digits in (("gamma_on", 1e-6), ("gamma_sounding", 1e-6), ("gamma_off", 1e-4), ("p_req_pa", 1e-2)):
         np.testing.assert_allclose(found[name], said[name], atol=digits, err_msg=name)
+    assert found["written_midi"].dtype == np.int64 and (found["written_midi"] - 69).min() < 0
+    low, high = list(found["written_midi"]).index(75), list(found["written_midi"]).index(81)
+    # The onset of D#5 is that of a lower register, its own is its own.
+    assert found["sounding_hz"][low] < 300 and found["gamma_own"][low] > found["gamma_sounding"][low]
+    assert found["gamma_own"][high] == found["gamma_sounding"][high]
     # `threshold` finds the peak a little differently.
     linear = table("threshold", "--all", "--zeta", "0.25")
     np.testing.assert_allclose(found["gamma_on"][:40], linear["gamma_on"][:40], atol=2e-3)
@@ -53,6 +58,7 @@ def test_feel_and_torque_are_those_of_the_command_line(table):
     feel = chalumeau.feel("G4", law="pressure")
     for name in ("a_on_deg", "a_off_deg", "a_close_deg", "scale_mnm", "h", "k"):
         assert feel[name] == pytest.approx(said[name][0], abs=1e-4), name
+    assert feel["most_mnm"] == pytest.approx(said["most_mnm"][0], abs=6e-3)
     curve = table("haptic", "--written", "G4", "--law", "pressure", "--curve")
     torques = chalumeau.torque("G4", curve["angle_deg"], law="pressure")
     np.testing.assert_allclose(torques, curve["torque_mnm"], atol=1e-5)

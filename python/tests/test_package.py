@@ -87,3 +87,10 @@ def test_types_agree(root, tmp_path):
     words = [sys.executable, "-m", "mypy", "--config-file", root / "python/pyproject.toml", "--no-incremental", "-p", "chalumeau"]
     said = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
     assert said.returncode == 0, said.stdout
+
+
+def test_dir_and_help_have_every_function():
+    import pydoc
+
+    assert set(chalumeau.__all__) <= set(dir(chalumeau)) and "__getattr__" not in dir(chalumeau)
+    assert "dataset(" in pydoc.render_doc(chalumeau, renderer=pydoc.plaintext)

@@ -296,3 +296,41 @@ def test_speed_is_that_of_the_command_line(program, tmp_path):
     print(f"speed over that of the command line: {ratio:.2f}")
     # It is 1 but for what else runs on the machine; a copy of each sample by Python would make it a tenth.
     assert ratio > 0.8, times
+
+
+def test_a_list_of_notes_plays_chords_as_a_midi_file_does():
+    # One beat is 0.5 s, and so are both notes.
+    track = bytes([0, 0x90, 60, 102, 0, 0x90, 64, 102, 96, 0x80, 60, 0, 0, 0x80, 64, 0, 0, 0xFF, 0x2F, 0])
+    midi = b"MThd" + bytes([0, 0, 0, 6, 0, 0, 0, 1, 0, 96]) + b"MTrk" + len(track).to_bytes(4, "big") + track
+    velocity = 102 / 127
+    chord = [(0, 0.5, 60, velocity), (0, 0.5, 64, velocity)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        of_list = chalumeau.render(chord, players=2, tail=0.2)
+    of_file = chalumeau.render(midi, players=2, tail=0.2)
+    assert (of_list == of_file).all() and np.abs(of_list).max() > 0.05
+    with pytest.warns(UserWarning, match="players=2 or more play chords"):
+        alone = chalumeau.render(chord, tail=0.2)
+    assert alone.ndim == 1
+
+
+def test_a_clarinet_is_not_copied_and_a_list_without_notes_is_told():
+    import copy
+    import pickle
+
+    clarinet = chalumeau.Clarinet()
+    for make in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(TypeError, match="make another: Clarinet"):
+            make(clarinet)
+    with pytest.warns(UserWarning, match="no notes"):
+        chalumeau.render([], tail=0.1)
+    with pytest.raises(FileNotFoundError, match='say written="C4"'):
+        chalumeau.render("C4")
+    with pytest.raises(ValueError, match="nothing to play"):
+        chalumeau.render()
+
+
+def test_warnings_name_the_line_that_called():
+    with pytest.warns(UserWarning) as told:
+        chalumeau.render([(0, 0.1, 60), (0, 0.1, 64)], tail=0.1)
+    assert told[0].filename == __file__

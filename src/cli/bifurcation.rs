@@ -26,9 +26,10 @@ Examples:
 /// Gamma (mouth pressure over closing pressure) runs from 0 to --to and back, --seconds each way. direction is 1 (rising)
 /// or -1 (falling), rms is the pressure in the mouthpiece over the closing pressure, shut is the fraction of time the reed
 /// is shut, own the share of power at the note's frequency, near 0 where another register sounds in its place. Comments say where the
-/// note begins, beats, chokes (or gives way to another register), returns and ends. Up and down differ because a moving breath
+/// note begins, the reed shuts for a part of each period, the note chokes (or gives way to another register), returns and ends. Up and down differ because a moving breath
 /// passes a threshold before the note has grown or died. If the difference does not shrink with more --seconds, it is true
-/// hysteresis.
+/// hysteresis. On a curved lay the reed shuts later than `report` and the plugin
+/// say that it beats: they calculate that for a sharp facing.
 ///
 /// The linear threshold among the comments is that of `chalumeau threshold`: the theory of a reed without inertia. As the reed has inertia,
 /// some high notes, such as C6, begin below it.
@@ -122,7 +123,7 @@ impl BifurcationCommand {
                 down: way(&found.down),
                 threshold,
                 begins: changes.begins,
-                beats: changes.beats,
+                shuts: changes.shuts,
                 chokes: changes.chokes,
                 returns: changes.returns,
                 ends: changes.ends,
@@ -150,16 +151,16 @@ pub(super) fn refuse_silent(
 /// Gamma of every change of the note on a ramp up to `to`, for the comment in the table. What cannot be, such as the end of a
 /// note that has not begun, is not told.
 fn changes_in_words(threshold: Option<f64>, changes: &Transitions, to: f64) -> String {
-    let Transitions { begins, beats, chokes, returns, opens, ends } = *changes;
+    let Transitions { begins, shuts, chokes, returns, opens, ends } = *changes;
     let up_to = |what: &str| Some(format!("does not {what} up to gamma {to}"));
     let not = |what: &str, of: Option<f64>| of.map(|_| format!("does not {what}"));
     let all = [
         ("linear threshold", threshold, Some("no linear threshold".to_owned())),
         ("begins", begins, up_to("begin")),
-        ("beats", beats, up_to("beat")),
+        ("shuts in each period", shuts, up_to("shut in each period")),
         ("chokes", chokes, up_to("choke")),
         ("returns", returns, not("return", chokes)),
-        ("stops beating", opens, not("stop beating", beats)),
+        ("shuts no more", opens, not("open for good", shuts)),
         ("ends", ends, not("end", begins)),
     ];
     let words = all.into_iter().filter_map(|(what, at, otherwise)| match at {
@@ -178,7 +179,7 @@ mod tests {
         let changes = Transitions { begins: Some(0.4), ..Transitions::default() };
         assert_eq!(
             changes_in_words(Some(0.35), &changes, 0.5),
-            "linear threshold 0.3500, begins 0.4000, does not beat up to gamma 0.5, does not choke up to gamma 0.5, does not end"
+            "linear threshold 0.3500, begins 0.4000, does not shut in each period up to gamma 0.5, does not choke up to gamma 0.5, does not end"
         );
     }
 }

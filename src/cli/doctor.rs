@@ -15,6 +15,7 @@ use serialport::SerialPortType;
 use std::io;
 use std::io::Write;
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -35,7 +36,7 @@ const FEEL_EVERY: Duration = Duration::from_millis(50);
 ///
 /// Lists serial and MIDI ports, opens those that may have a knob (known USB identities and simulated knobs, others only
 /// with --path), and reports the firmware, rate, jitter and round trip of each knob. It arms no knob: there is no torque.
-/// If no knob answers, it says what to do next.
+/// If no knob answers, it says what to do next, and the exit code is 1.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct DoctorCommand {
@@ -54,14 +55,20 @@ pub struct DoctorCommand {
 }
 
 impl DoctorCommand {
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<ExitCode, Failure> {
+        Ok(if self.found()? { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    }
+
+    /// Whether a knob answers.
+    fn found(&self) -> Result<bool, Failure> {
         let mut out = io::stdout().lock();
         writeln!(out, "Chalumeau {VERSION}, TTLink {MAJOR}.{MINOR}")?;
         if let Some(port) = self.osc {
             return Ok(self.ask_osc(&mut out, port)?);
         }
         if let Some(path) = &self.path {
-            match self.ask(&mut out, KnobChoice::Path(path.clone()))? {
+            let answer = self.ask(&mut out, KnobChoice::Path(path.clone()))?;
+            match answer {
                 Answer::Live => {}
                 Answer::InUse => tell_who_has_it(&mut out)?,
                 Answer::None => {
@@ -69,7 +76,7 @@ impl DoctorCommand {
                     tell_what_next(&mut out)?;
                 }
             }
-            return Ok(());
+            return Ok(answer == Answer::Live);
         }
         let places = RuntimeDir::default();
         list_serial(&mut out, &places)?;
@@ -81,14 +88,14 @@ impl DoctorCommand {
             answers.push(self.ask(&mut out, choice)?);
         }
         if answers.contains(&Answer::Live) {
-            return Ok(());
+            return Ok(true);
         }
         if answers.contains(&Answer::InUse) {
             tell_who_has_it(&mut out)?;
         } else {
             tell_what_next(&mut out)?;
         }
-        Ok(())
+        Ok(false)
     }
 
     /// Links to `choice`, watches it and reports.
@@ -136,7 +143,7 @@ impl DoctorCommand {
         Ok(if status.phase == Phase::Live { Answer::Live } else { Answer::None })
     }
 
-    fn ask_osc(&self, out: &mut impl Write, port: u16) -> io::Result<()> {
+    fn ask_osc(&self, out: &mut impl Write, port: u16) -> io::Result<bool> {
         let from = if self.any_address { "the whole network" } else { "this machine alone" };
         writeln!(out, "\nOSC at UDP port {port}, from {from}")?;
         out.flush()?;
@@ -155,9 +162,10 @@ impl DoctorCommand {
                 )?;
                 writeln!(out, "  angle: {:.1} degrees", status.angle_deg.unwrap_or(0.0))?;
                 writeln!(out, "  rate: {:.0} angles a second (25 are sent)", status.stats.rate_hz)?;
-                writeln!(out, "  ignored: {} messages", status.stats.ignored)
+                writeln!(out, "  ignored: {} messages", status.stats.ignored)?;
+                return Ok(true);
             }
-            Phase::Busy(text) | Phase::HeldBy(text) | Phase::Failed(text) => writeln!(out, "  {text}"),
+            Phase::Busy(text) | Phase::HeldBy(text) | Phase::Failed(text) => writeln!(out, "  {text}")?,
             _ => {
                 writeln!(
                     out,
@@ -176,9 +184,10 @@ impl DoctorCommand {
                     out,
                     "  and listen with --any-address. The port is {} as the firmware comes.",
                     osc::PORT
-                )
+                )?;
             }
         }
+        Ok(false)
     }
 }
 

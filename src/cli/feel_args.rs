@@ -51,7 +51,7 @@ pub struct FeelArgs {
     /// Which note feels harder [default: physical]
     #[arg(long, value_enum)]
     order: Option<OrderArg>,
-    /// Written note that contrast and place do not change [default: C5 or, without one, the middle of the chart]
+    /// Written note that contrast and place do not change [default: C5 or, without one, the note that requires a medium pressure]
     #[arg(long, value_name = "NOTE", value_parser = note)]
     reference: Option<u8>,
     /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450 [default: 55]

@@ -3,6 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
 use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole};
+use chalumeau_core::bore::fingering_finder::mechanism::Mechanism;
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix};
@@ -63,6 +64,20 @@ pub struct FingeringsCommand {
     table: TableArgs,
 }
 
+/// Warns of holes that the search can never move, because their kind does not fit their name.
+pub(super) fn say_contrary(file: &InstrumentFile) {
+    for (name, is_open) in Mechanism::boehm().contrary(file) {
+        let (kind, right) = if is_open {
+            ("open at rest", "a key opens the hole of this name, so it is key-closed")
+        } else {
+            ("closed at rest", "a finger or a pad closes the hole of this name, so it is finger or pad-open")
+        };
+        say!(
+            "warning: {name} is {kind}; on a Boehm clarinet {right}. As it is, the search for fingerings never moves it"
+        );
+    }
+}
+
 impl FingeringsCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.table.check_files(&[self.instrument.file()], &[])?;
@@ -78,10 +93,11 @@ impl FingeringsCommand {
             .ok_or_else(|| Failure::Usage("the search was ended".to_owned()))?;
         if !finder.unmoved().is_empty() {
             say!(
-                "warning: {} cannot be moved, as a Boehm clarinet has no holes of these names; the search leaves them as they are at rest",
+                "warning: {} cannot be moved: no key of the search has such a name; it stays as at rest, closed if key-closed, open if pad-open. The names that the search knows: docs/instrument-file.md",
                 finder.unmoved().join(" ")
             );
         }
+        say_contrary(&file);
         let looked = format!("{}; {} looked through", file.name, counted(finder.len(), "fingering"));
         let Some(note) = self.note.map(WrittenNote) else {
             let mut table = self.table.open("fingers,low_hz,high_hz,uneven_db,gamma_on,cost,open")?;

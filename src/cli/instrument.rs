@@ -7,7 +7,7 @@ use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole, withi
 use crate::output::NewFile;
 use crate::text_file;
 use chalumeau_core::bore::bundled::Bundled;
-use chalumeau_core::bore::check::{Check, Concern};
+use chalumeau_core::bore::check::{Check, Concern, NoteCheck};
 use chalumeau_core::bore::cylinder::Cylinder;
 use chalumeau_core::bore::instrument_file::{BoreSegment, ImportDetails, ImportError, InstrumentFile, Sheet};
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
@@ -175,6 +175,9 @@ impl Import {
     }
 }
 
+/// A note whose resonance is farther away is another one.
+const FAR_CENTS: f64 = 300.0;
+
 /// The comments a table begins with.
 fn head_comments(text: &str) -> String {
     let lines: Vec<&str> = text
@@ -246,7 +249,11 @@ impl CheckFile {
             say!("{named}: cannot be played");
             return Ok(ExitCode::from(2));
         }
-        say!("{named}: can be played, {}", counted(count, "warning"));
+        super::fingerings::say_contrary(&file);
+        // A resonance so far away is not the note's.
+        let is_far = |note: &NoteCheck| note.cents.is_none_or(|cents| cents.abs() > FAR_CENTS);
+        let but = if check.notes.iter().all(is_far) { ", but probably no note will speak" } else { "" };
+        say!("{named}: can be loaded, {}{but}; `chalumeau tune` plays its notes", counted(count, "warning"));
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -459,7 +466,11 @@ impl Show {
                 1e3 * hole.x_m,
                 1e3 * hole.chimney_m,
                 2e3 * hole.radius_m,
-                quoted(if hole.register { "register hole" } else { "" })
+                quoted(&format!(
+                    "{}{}",
+                    hole.kind.name(),
+                    if hole.register { ", register hole" } else { "" }
+                ))
             ))?;
         }
         for fingering in &file.fingerings {

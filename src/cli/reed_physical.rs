@@ -115,7 +115,12 @@ pub fn both_faces(
         ("rest opening at the tip", "H", 1e3 * reed.tip_opening_m, "mm"),
         ("closing pressure", "p_M", closing_pa / 1e3, "kPa"),
         ("embouchure parameter of this reed", "zeta", reed.zeta(&air, REFERENCE_RADIUS_M), ""),
-        ("air that yields as the reed", "V", 1e9 * reed.equivalent_volume_m3(&air), "mm3"),
+        (
+            "air that yields as this reed; played is that of the instrument file",
+            "V",
+            1e9 * reed.equivalent_volume_m3(&air),
+            "mm3",
+        ),
         ("half-width of the curved closure", "lay", 1e3 * lay * reed.tip_opening_m, "mm"),
         (
             "strength as on the box",

@@ -40,7 +40,7 @@ use std::sync::Arc;
 
 use breath_args::BreathArgs;
 pub use breath_args::{BreathSource, GAMMA_DEFAULT};
-use given::score_of;
+use given::score_of_parts;
 pub use given::{Given, TimedNote};
 
 /// Least and greatest length of a note, s.
@@ -458,7 +458,7 @@ impl ScoreArgs {
         }
         if let Some(path) = &self.midi {
             let bytes = match &self.given {
-                Some(Given::Notes(notes)) => return Ok(((&score_of(notes, self.rate)).into(), [0; 128])),
+                Some(Given::Notes(notes)) => return Ok(score_of_parts(notes, self.rate, players.parts())),
                 Some(Given::Midi { bytes, .. }) => bytes.clone(),
                 None => fs::read(path).map_err(|source| no_such_piece(path, source))?,
             };

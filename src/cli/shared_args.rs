@@ -276,14 +276,24 @@ impl PlayedArgs {
     }
 }
 
+/// A maker who has measured well is not so far away, percent of the size: half a semitone.
+const MUCH_PERCENT: f64 = 3.0;
+
 /// Says whether the instrument is played in another size than measured: every measurement of it depends on that.
 fn say_how_it_is_scaled(model: &Model, wanted: &Wanted) {
     let own_scale = A4_HZ / wanted.tuned_a4_hz();
     let longer = 100.0 * (model.scale / own_scale - 1.0);
     if longer != 0.0 {
         let (by, how) = (longer.abs(), if longer > 0.0 { "larger" } else { "smaller" });
+        let (weight, advice) = match by > MUCH_PERCENT {
+            true => (
+                "warning",
+                ". That is much: `chalumeau instrument check` tells whether transposition, octaves or lengths are wrong",
+            ),
+            false => ("note", ""),
+        };
         say!(
-            "note: the whole instrument is played {by:.2} % {how} than measured, to be in tune (--untuned plays it as measured)"
+            "{weight}: the whole instrument is played {by:.2} % {how} than measured, to be in tune (--untuned plays it as measured){advice}"
         );
     }
 }

@@ -32,6 +32,9 @@ const MEASURE_S: f64 = 0.6;
 /// through which no air flows (--A 0) moves at most as loud as -71 dBFS.
 const SILENT_DBFS: f64 = -65.0;
 
+/// A note that is so far off where the others are not has another name than its holes. As `docs/instrument-file.md` says.
+const MISNAMED_CENTS: f64 = 300.0;
+
 const EXAMPLES: &str = "\
 Examples:
   chalumeau tune --rate 48000 --gamma 0.5
@@ -133,6 +136,21 @@ impl TuneCommand {
             }
         }
         table.finish()?;
+        // What all notes are off by is no mistake in the chart.
+        let mut offs: Vec<f64> = as_built.iter().flatten().map(|(_, cents)| *cents).collect();
+        offs.sort_by(f64::total_cmp);
+        let usual = offs.get(offs.len() / 2).copied().unwrap_or_default();
+        for (note, (_, cents)) in
+            notes.iter().zip(&as_built).filter_map(|(note, heard)| Some((note, heard.as_ref()?)))
+        {
+            if (cents - usual).abs() > MISNAMED_CENTS {
+                let how = if *cents > usual { "above" } else { "below" };
+                say!(
+                    "warning: {note} sounds {:.0} cents {how} its name: look at its name and its holes in the chart",
+                    cents.abs()
+                );
+            }
+        }
         let silent = notes.iter().zip(&heard).filter(|(_, heard)| heard.is_none());
         let silent: Vec<_> = silent.map(|(note, _)| note.to_string()).collect();
         if !silent.is_empty() {

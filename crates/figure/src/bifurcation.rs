@@ -20,10 +20,10 @@ pub struct Ramp {
     pub down: RampPoints,
     /// Where the linear theory lets the note begin.
     pub threshold: Option<f64>,
-    /// Growing: the note begins, beats, chokes.
+    /// Growing: the note begins.
     pub begins: Option<f64>,
-    /// Growing: the reed touches the lay.
-    pub beats: Option<f64>,
+    /// Growing: the reed shuts for a part of each period.
+    pub shuts: Option<f64>,
     /// Growing: the note ends because the reed stays shut.
     pub chokes: Option<f64>,
     /// Fading: it comes back.
@@ -36,7 +36,7 @@ pub struct Ramp {
 const FLOOR: f64 = 1e-5;
 
 impl Ramp {
-    /// Amplitude, the same on a logarithmic axis, and the beating reed.
+    /// Amplitude, the same on a logarithmic axis, and how long the reed is shut.
     pub fn figure(&self) -> Figure {
         let highest = self.up.iter().chain(&self.down).map(|point| point[0]).fold(0.1, f64::max);
         let axis = || Axis::linear("mouth pressure over closing pressure, gamma").range(0.0, highest);
@@ -73,7 +73,7 @@ impl Ramp {
         for (at, name, colour) in [
             (self.threshold, "linear threshold", Colour::Ink),
             (self.begins, "begins", Colour::Blue),
-            (self.beats, "beats", Colour::Blue),
+            (self.shuts, "shuts in each period", Colour::Blue),
             (self.chokes, "chokes", Colour::Blue),
             (self.returns, "returns", Colour::Vermilion),
             (self.ends, "ends", Colour::Vermilion),
@@ -88,8 +88,12 @@ impl Ramp {
             axis(),
             Axis::log("rms over closing pressure"),
         );
-        let shut = Panel::new("Beating reed", axis(), Axis::linear("part of the time shut").range(0.0, 1.05))
-            .weight(0.8);
+        let shut = Panel::new(
+            "How long the reed is shut",
+            axis(),
+            Axis::linear("part of the time shut").range(0.0, 1.05),
+        )
+        .weight(0.8);
         Figure::new(format!("Up and down the breath: {}", self.title))
             .note(self.note.clone())
             .panel(both(amplitude, 1, 0.0))

@@ -51,6 +51,9 @@ else:
             return module if name == "datasets" else module.dataset
         raise AttributeError(f"module 'chalumeau' has no attribute {name!r}")
 
+    def __dir__() -> list[str]:
+        return [*__all__]
+
 
 __all__ = [
     "Clarinet",

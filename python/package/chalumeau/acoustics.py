@@ -105,11 +105,14 @@ def thresholds(*, instrument: InstrumentLike = "b-flat", **reed: Value) -> dict[
     The reed is that of ``chalumeau haptic``: ``zeta`` (0.05..0.9, 0.3), ``strength`` (1.5..5, 2.5), ``lip`` (0.6..1.4, 1),
     ``H``, ``k``, and ``temperature`` (°C).
 
-    Returns arrays with one value for each fingering; a note that cannot sound has nan:
+    Returns arrays with one value for each fingering. A note for which the theory finds no pressures has nan; a note whose key is silent, such as
+    C#7, has numbers:
 
     - ``written_midi``;
     - ``gamma_on``: the oscillation threshold of a reed without inertia, at least 1/3;
-    - ``gamma_sounding``: the dynamic threshold, where the reed as it moves under the lip begins to sound; ``sounding_hz``;
+    - ``gamma_sounding``: the lowest pressure at which the reed, as it moves under the lip, begins to sound on any resonance; ``sounding_hz``, its
+      frequency, which for some notes, such as D#5 to F#5, is that of a lower register;
+    - ``gamma_own``: where the note itself begins;
     - ``gamma_beat``: where the reed begins to touch the lay;
     - ``gamma_off``: extinction, where a note that sounds chokes as the pressure rises; as it falls, the note returns only lower, near 1.2;
     - ``p_req_pa``: ``gamma_on`` in Pa; and ``p_closing_pa``, one number.
@@ -138,7 +141,9 @@ def bifurcation(
 
     ``settings`` are those of the sound, as in `render` (see `parameters`). Returns arrays of equal length: ``direction`` (1 rising, -1 falling), ``gamma``, ``rms``
     (pressure in the mouthpiece over the closing pressure), ``shut`` (share of time in which the reed is shut) and ``own`` (share of
-    power at the note's frequency: near 0, another register sounds); and the gammas at which the note ``begins``, ``beats``, ``chokes``, ``returns``, ``opens`` and ``ends``, None where it does not.
+    power at the note's frequency: near 0, another register sounds); and the gammas at which the note
+    ``begins``, the reed ``shuts`` for a part of each period, the note ``chokes`` and ``returns``, the reed ``opens`` for good, and the note ``ends``; None
+    where it does not. On a curved lay the reed shuts later than at the ``gamma_beat`` of `thresholds`.
 
     A moving breath passes a threshold before the note has grown or died (Bergeot, Almeida, Vergez and Gazengel, 2013), so
     these depend on ``seconds``. The same as ``chalumeau bifurcation``.
@@ -203,7 +208,7 @@ def feel(written: NoteLike, *, instrument: InstrumentLike = "b-flat", **design: 
     the reed's ``zeta``, ``strength``, ``lip``, ``H``, ``k``, ``temperature``.
 
     Returns ``law``, ``h``, ``k``, ``scale_mnm``, ``stretch``, ``offset_deg``, ``wall_deg``, ``wall_mnm_per_deg``,
-    ``slap_mnm_per_deg``, ``damping_mnms``, ``friction_mnm``, ``detent_mnm``, ``morph_ms``, and the angles from rest in degrees
+    ``slap_mnm_per_deg``, ``damping_mnms``, ``friction_mnm``, ``detent_mnm``, ``morph_ms``, ``most_mnm`` (the most torque up to the wall, mark and friction included), and the angles from rest in degrees
     at which the note starts, beats, closes and stops: ``a_on_deg``, ``a_beat_deg``, ``a_close_deg``, ``a_off_deg``.
 
     Raises `ValueError` for a feel that a knob would refuse. Takes a second. Model and sources: ``docs/feel.md``.

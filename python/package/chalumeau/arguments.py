@@ -58,10 +58,15 @@ def instrument(what: InstrumentLike) -> Instrument:
     if isinstance(what, str):
         if "\n" in what:
             return Instrument.parse(what)
-        if not what.lower().endswith(".toml"):
+        if not what.lower().endswith(".toml") and not Path(what).is_file():
             return Instrument.bundled(what)
     if isinstance(what, (str, os.PathLike)):
-        return Instrument.parse(Path(what).read_text(encoding="utf-8"))
+        try:
+            return Instrument.parse(Path(what).read_text(encoding="utf-8"))
+        except UnicodeDecodeError:
+            raise ValueError(f"{os.fspath(what)}: it is not in UTF-8; save it as UTF-8 text in your editor") from None
+        except ValueError as error:
+            raise ValueError(f"{os.fspath(what)}: {error}") from None
     raise TypeError(
         f"an instrument is an id ({', '.join(Instrument.ids())}), a path, a text, a dict or an Instrument, "
         f"not {type(what).__name__}"
@@ -69,7 +74,7 @@ def instrument(what: InstrumentLike) -> Instrument:
 
 
 def fingerings(instrument: InstrumentLike = "b-flat") -> list[dict[str, Any]]:
-    """The fingering chart, from the lowest note to the highest.
+    """The fingering chart, from the lowest note to the highest. The command ``chalumeau fingerings`` searches for others.
 
     Each fingering has ``written_midi`` and ``written`` (its name), ``sounding_midi``, ``register``, ``mode`` (which
     resonance of the bore sounds, 1 the lowest), ``fingers`` (for a reader) and ``open`` (names of the open holes).
@@ -190,6 +195,8 @@ def note(what: NoteLike) -> int:
         what = int(what)
     if isinstance(what, str):
         what = _spelt(what)
+    if isinstance(what, float):
+        raise ValueError(f"a note is a MIDI number or a name such as 'C4'; {what} is not a whole number")
     if isinstance(what, bool) or not (isinstance(what, str) or hasattr(what, "__index__")):
         raise TypeError(f"a note is a MIDI number or a name such as 'C4', not {type(what).__name__}")
     return _native.note(what if isinstance(what, str) else str(operator.index(cast(SupportsIndex, what))))
@@ -210,6 +217,8 @@ _WHOLE = ("written", "sounding", "rate", "players")
 
 def text_of(name: str, value: Value) -> str:
     """A value as the command line would have it."""
+    if name.replace("-", "_") == "open_holes" and isinstance(value, (list, tuple)):
+        return " ".join(value)
     value = plain(name, value)
     if isinstance(value, str):
         return _spelt(value) if name in ("written", "sounding") else value

@@ -99,7 +99,11 @@ def measure(row: Mapping[str, Value], sound: bool = False) -> dict[str, Any]:
     (233, 0.5)
     """
     score, named, channels, rate = split(row)
-    made = played(score, settings=named, rate=rate, channels=channels)
+    # What is no text is an instrument itself; a row of a file names it.
+    own = named["instrument"] if not isinstance(named.get("instrument", ""), str) else None
+    if own is not None:
+        del named["instrument"]
+    made = played(score, instrument=own, settings=named, rate=rate, channels=channels)
     samples = made["samples"]
     power = float(np.mean(np.square(samples, dtype=np.float64))) if samples.size else 0.0
     peak = float(np.abs(samples).max(initial=0.0))

@@ -7,7 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Union
+from typing import Any, NamedTuple, SupportsIndex, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -114,11 +114,18 @@ def played(
     elif isinstance(score, (str, os.PathLike)):
         if score == "":
             raise ValueError('the score is an empty text; give the path of a MIDI file, or written="C4" for one note')
-        midi, path = Path(score).read_bytes(), score
+        try:
+            midi, path = Path(score).read_bytes(), score
+        except FileNotFoundError:
+            if not _is_note(score):
+                raise
+            raise FileNotFoundError(f'there is no file {score}; for one note say written="{score}"') from None
     elif score is not None:
         if not isinstance(score, Iterable):
             raise TypeError(f"a score is the path of a MIDI file, its bytes or a list of notes, not {score!r}; for one note say written={score!r}")
         notes = [_listed(one) for one in score]
+        if not notes:
+            warnings.warn("the list has no notes, so nothing is heard", stacklevel=3)
     made = _native.render(
         pairs(settings, named, {"rate": rate, "players": players}),
         None if instrument is None else instrument_of(instrument),
@@ -135,6 +142,13 @@ def played(
             stacklevel=3,
         )
     return made
+
+
+def _is_note(name: Any) -> bool:
+    try:
+        return isinstance(name, str) and note(name) >= 0
+    except ValueError:
+        return False
 
 
 def _listed(one: Any) -> tuple[float, float, int, float]:
@@ -417,6 +431,12 @@ class Clarinet:
         if not 0.0 <= seconds <= 86_400.0:
             raise ValueError(f"{what} must lie in 0..86400, got {seconds}")
         return round(seconds * self.rate)
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
+        """Refuses `copy` and `pickle`: a copy would share the sound."""
+        raise TypeError(
+            "a Clarinet that plays cannot be copied; make another: Clarinet(old.instrument, rate=old.rate, settings=old.settings)"
+        )
 
     def __repr__(self) -> str:
         return f"Clarinet({self._instrument!r}, rate={self.rate}, settings={self._settings})"

@@ -161,7 +161,7 @@ impl<'a> BreathAndHaptics<'a> {
         };
         let told = [
             said(found.begins, "begins at"),
-            said(found.beats, "is shut for a part of each period from"),
+            said(found.shuts, "is shut for a part of each period from"),
             said(found.chokes, "chokes, while the breath rises, at"),
             said(found.returns, "sounds again, when the breath falls, from"),
             said(found.ends, "ends at"),

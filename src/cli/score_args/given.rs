@@ -1,6 +1,7 @@
 //! What a caller that is a program plays: bytes of a MIDI file, or notes and their times.
 
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::control::parts::{Parts, Unplayed};
+use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::score::Score;
 use chalumeau_core::units::SoundingNote;
 use std::path::PathBuf;
@@ -29,6 +30,36 @@ pub struct TimedNote {
     pub note: SoundingNote,
     /// Velocity, 0..=1.
     pub velocity: f32,
+}
+
+/// The score of notes for so many players, of whom each plays a part of a chord, and what they do not play.
+pub(super) fn score_of_parts(notes: &[TimedNote], rate: u32, players: usize) -> (Score<PartEvent>, Unplayed) {
+    let score = score_of(notes, rate);
+    if players < 2 {
+        return ((&score).into(), [0; 128]);
+    }
+    let mut parts = Parts::new(players);
+    let mut events = Vec::new();
+    for Timed { at, event } in score.events {
+        match event {
+            Event::NoteOn { note, velocity: struck } => {
+                // As MIDI tells it, the velocity is rounded; as the list tells it, it is not.
+                let told = parts.note_on(0, note.0, (127.0 * struck).round().clamp(1.0, 127.0) as u8);
+                events.extend(told.iter().map(|said| {
+                    let event = match said.event {
+                        Event::NoteOn { note, .. } => Event::NoteOn { note, velocity: struck },
+                        other => other,
+                    };
+                    Timed { at, event: PartEvent { event, ..*said } }
+                }));
+            }
+            Event::NoteOff { note } => {
+                events.extend(parts.note_off(0, note.0).iter().map(|&event| Timed { at, event }));
+            }
+            other => events.push(Timed { at, event: other.into() }),
+        }
+    }
+    (Score { events, samples: score.samples }, *parts.unplayed())
 }
 
 /// The score of notes. A key that comes up where another goes down comes up after it: a slur.

@@ -2,8 +2,8 @@
 //!
 //! The [`mechanism`] says which holes the fingers can open together; the [survey](TransferMatrix::survey) finds all resonances
 //! of all these fingerings by transfer matrices, within seconds. A note is ranked by what a player asks of it: in tune, easy to blow,
-//! in no doubt about its register, and easy for the fingers. Dickens, France, Smith & Wolfe (2007) did the same for 39744 fingerings
-//! (The virtual clarinet, Acoustics Australia 35).
+//! in no doubt about its register, and easy for the fingers. Botros, Smith & Wolfe (2006) did so for the 39744 fingerings of a
+//! flute (The Virtual Flute: an advanced fingering guide generated via machine intelligence).
 //!
 //! Left out: the vocal tract, and the reed's own pull on the pitch.
 
@@ -40,6 +40,7 @@ const ALIKE_CENTS: f64 = 35.0;
 /// All fingerings of an instrument with their resonances.
 #[derive(Debug)]
 pub struct FingeringFinder {
+    mechanism: Mechanism,
     transposition: i8,
     a4_hz: f64,
     /// Holes that fingers cover, from the top.
@@ -140,7 +141,8 @@ impl FingeringFinder {
         a4_hz: f64,
         on: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Option<Self> {
-        let grips = Mechanism::boehm().grips(file);
+        let mechanism = Mechanism::of(file);
+        let grips = mechanism.grips(file);
         let open: Vec<u64> = grips.iter().map(|grip| grip.open).collect();
         let model = TransferMatrix::new(file, air);
         let range_hz = range_hz(file);
@@ -167,14 +169,15 @@ impl FingeringFinder {
             a4_hz,
             finger_holes,
             out_of_reach: out_of_reach.collect(),
-            unmoved: Mechanism::boehm().unmoved(file),
+            unmoved: mechanism.unmoved(file),
+            mechanism,
             grips,
             resonances,
             chart,
         })
     }
 
-    /// Names of the holes that no finger of the mechanism moves: they have other names than those of a Boehm clarinet. They
+    /// Names of the holes that neither finger nor key moves: keys and pads with other names than those of a Boehm clarinet. They
     /// stay as they are at rest in every fingering that is looked through.
     pub fn unmoved(&self) -> &[String] {
         &self.unmoved
@@ -188,7 +191,7 @@ impl FingeringFinder {
             let at = self.grips.binary_search_by_key(&grip.open, |grip| grip.open).ok()?;
             let mut found = self.found(*grip, &self.resonances[at], wanted_hz, f64::INFINITY)?;
             found.cost += self.cost_of_the_way(written, grip);
-            return Some(Found { fingers: Mechanism::boehm().words(grip), ..found });
+            return Some(Found { fingers: self.mechanism.words(grip), ..found });
         }
         let (_, open, resonances) = self.out_of_reach.iter().find(|(note, ..)| *note == written)?;
         let grip = Grip { open: *open, positions: [0; MAX_FINGERS], effort: 0 };
@@ -231,7 +234,7 @@ impl FingeringFinder {
                 better.grip.moves(&one.grip) == 1 && (better.cents - one.cents).abs() < SAME_CENTS
             };
             if best.len() < count && !best.iter().any(same) {
-                best.push(Found { fingers: Mechanism::boehm().words(&one.grip), ..one });
+                best.push(Found { fingers: self.mechanism.words(&one.grip), ..one });
             }
         }
         best
@@ -262,7 +265,7 @@ impl FingeringFinder {
                 one.f_hz.iter().zip(&other.f_hz).all(|(a, b)| cents(*a, *b).abs() < ALIKE_CENTS)
             };
             if found.len() < count && !found.iter().any(near) {
-                found.push(Multiphonic { fingers: Mechanism::boehm().words(&one.grip), ..one });
+                found.push(Multiphonic { fingers: self.mechanism.words(&one.grip), ..one });
             }
         }
         found

@@ -101,6 +101,17 @@ pub enum HoleKind {
     PadOpen,
 }
 
+impl HoleKind {
+    /// What files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Finger => "finger",
+            Self::KeyClosed => "key-closed",
+            Self::PadOpen => "pad-open",
+        }
+    }
+}
+
 /// A circular tone hole or vent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToneHole {

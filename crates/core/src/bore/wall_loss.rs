@@ -1,7 +1,8 @@
 //! Viscothermal losses at the bore's walls, as one first-order filter per cell and direction.
 //!
 //! In a wide tube the propagation constant is `s/c + K_v sqrt(s) / r` with
-//! `K_v = (1 + (gamma - 1) / sqrt(Pr)) sqrt(mu / rho) / c` (Kirchhoff's asymptote). The root is approximated by three
+//! `K_v = (1 + (gamma - 1) / sqrt(Pr)) sqrt(mu / rho) / c` (Kirchhoff's asymptote), and a wall with tone holes loses
+//! [`HOLED_WALL`] times as much. The root is approximated by three
 //! high-passes and a delay, `sqrt(s) = sum c_k s / (s + p_k) + c_inf s`, within 5.9 % of |sqrt s| from 100 to 3000 Hz
 //! (worst at 2.1 kHz); the loss itself, its real part, within 4.8 %. Each cell gets one pole, dealt in rotation along the
 //! bore, and answers for the stretch between the midpoints to its neighbours of the same pole: a third of the work of
@@ -19,7 +20,7 @@ const DELAY: f64 = 2.46e-3;
 /// How much more than a smooth tube a wall with tone holes loses (fitted to the transfer matrices).
 pub const HOLED_WALL: f64 = 1.05;
 
-/// `K_v`, s^1/2: the loss of a tube of radius r and length L is `K_v L sqrt(s) / r`.
+/// `K_v` of a wall with tone holes, s^1/2: the loss of a tube of radius r and length L is `K_v L sqrt(s) / r`.
 pub fn wall_constant(air: &Air) -> f64 {
     let prandtl = air.mu * air.cp / air.kappa;
     HOLED_WALL * (1.0 + (air.gamma - 1.0) / prandtl.sqrt()) * (air.mu / air.rho).sqrt() / air.c

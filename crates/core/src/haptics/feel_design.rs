@@ -25,8 +25,8 @@ pub enum NoteOrder {
 pub struct FeelDesign {
     /// Torque law. Default: flow.
     pub law: TorqueLaw,
-    /// The reference note, which Contrast and Place do not change. `None` is written C5, or the middle of the chart if the
-    /// instrument has no C5.
+    /// The reference note, which Contrast and Place do not change. `None` is written C5, or the note of median requirement if
+    /// the instrument has no C5.
     ///
     /// C5 requires nearly the most of the notes that are played often. Contrast therefore mostly lowers torque, and stays
     /// below the ceiling.

@@ -64,6 +64,13 @@ pub struct NoteFeel {
     pub requirement: Option<NoteRequirement>,
 }
 
+impl NoteFeel {
+    /// The most torque between rest and wall, mNm, mark and friction included: what the ceiling must allow.
+    pub fn most_mnm(&self) -> f64 {
+        torque_law::extremes(&self.feel).torque_mnm + 0.1 * f64::from(self.feel.friction)
+    }
+}
+
 /// The feel of every note of an instrument. Immutable and `Sync`: share it in an `Arc`.
 ///
 /// Formulas and figures: `docs/feel.md`.

@@ -64,7 +64,7 @@ pub struct Transitions {
     /// Rising: the note begins.
     pub begins: Option<f64>,
     /// Rising: the reed begins to shut for a part of each period while the note sounds (beating).
-    pub beats: Option<f64>,
+    pub shuts: Option<f64>,
     /// Rising: the note chokes, because the reed stays shut, or gives way to another register.
     pub chokes: Option<f64>,
     /// Falling: a choked note sounds again.
@@ -76,14 +76,14 @@ pub struct Transitions {
 }
 
 impl BifurcationDiagram {
-    /// The values of gamma at which the note begins, beats, chokes, returns, opens and ends.
+    /// The values of gamma at which the note begins, the reed shuts, the note chokes, returns, opens and ends.
     pub fn transitions(&self) -> Transitions {
         let sounds = RampPoint::sounds;
         // What the tongue leaves behind fades; a note grows.
         let fading = self.up.windows(2).take_while(|pair| pair[1].rms < pair[0].rms).count();
         let begins = self.up.iter().skip(fading).position(sounds).map(|after| fading + after);
         let sounding = begins.map_or(&[][..], |begins| &self.up[begins..]);
-        let beats = sounding.iter().find(|point| point.shut > 0.0);
+        let shuts = sounding.iter().find(|point| point.shut > 0.0);
         // The first silent window after the last one that sounds.
         let chokes = sounding.iter().rposition(sounds).and_then(|last| sounding.get(last + 1));
         let returns = self.down.iter().position(sounds);
@@ -93,7 +93,7 @@ impl BifurcationDiagram {
         let gamma = |point: &RampPoint| point.gamma;
         Transitions {
             begins: sounding.first().map(gamma),
-            beats: beats.map(gamma),
+            shuts: shuts.map(gamma),
             chokes: chokes.map(gamma),
             // Only a choked note can return.
             returns: chokes.and(after.first()).map(gamma),
@@ -262,7 +262,7 @@ mod tests {
             ],
         };
         let changes = found.transitions();
-        assert_eq!((changes.begins, changes.beats, changes.chokes), (Some(0.4), Some(0.5), Some(1.5)));
+        assert_eq!((changes.begins, changes.shuts, changes.chokes), (Some(0.4), Some(0.5), Some(1.5)));
         assert_eq!((changes.returns, changes.opens, changes.ends), (Some(1.0), Some(0.45), Some(0.35)));
         assert_eq!(BifurcationDiagram::default().transitions(), Transitions::default());
         // Another register in its place is not the note.
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_low_note_begins_above_a_third_and_beats_near_one_half_on_a_sharp_lay() {
+    fn a_low_note_begins_above_a_third_and_shuts_near_one_half_on_a_sharp_lay() {
         let model = Arc::new(Model::built_in(48_000.0).unwrap());
         let settings = Settings { breath_full_kpa: 20.0, lay: 0.0, ..Settings::physical() };
         let mut samples = 0;
@@ -310,10 +310,10 @@ mod tests {
         // What is left is the bend of the breath where the ramp begins.
         assert!(first.rms < 1e-3 && first.shut == 0.0, "the tongue is not heard: {first:?}");
         let changes = found.transitions();
-        let (begins, beats, ends) = (changes.begins.unwrap(), changes.beats.unwrap(), changes.ends.unwrap());
+        let (begins, shuts, ends) = (changes.begins.unwrap(), changes.shuts.unwrap(), changes.ends.unwrap());
         assert!((1.0 / 3.0..0.5).contains(&begins), "{changes:?}");
         // Raman's string without losses: 1/2.
-        assert!((0.44..0.52).contains(&beats) && beats > begins, "{changes:?}");
+        assert!((0.44..0.52).contains(&shuts) && shuts > begins, "{changes:?}");
         assert!(ends < begins, "a ramp overtakes the threshold: {changes:?}");
         assert_eq!((changes.chokes, changes.returns), (None, None));
         let slow = measure(&model, &settings, SoundingNote(50), 0.8, 12.0, 48_000, |_| {}).transitions();

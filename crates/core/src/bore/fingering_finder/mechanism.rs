@@ -7,8 +7,8 @@ use serde::Deserialize;
 
 use crate::bore::instrument_file::{HoleKind, InstrumentFile};
 
-/// Fingers that a mechanism can have.
-pub const MAX_FINGERS: usize = 10;
+/// Fingers that a mechanism can have: those of a Boehm clarinet, and of holes that it does not have.
+pub const MAX_FINGERS: usize = 18;
 
 /// One combination of open holes, and how it is reached with the least effort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,21 +22,21 @@ pub struct Grip {
 }
 
 /// Fingers, and pads that rings move.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mechanism {
     ring: Vec<Ring>,
     finger: Vec<Finger>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Ring {
     pad: String,
     closed_with: String,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Finger {
     #[expect(dead_code, reason = "for a reader of the file")]
@@ -44,7 +44,7 @@ struct Finger {
     positions: Vec<Position>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Position {
     presses: String,
@@ -66,6 +66,35 @@ impl Mechanism {
     /// That of a clarinet with the Boehm system.
     pub fn boehm() -> &'static Self {
         &BOEHM
+    }
+
+    /// That of a clarinet with the Boehm system, with a further finger for each finger hole of this instrument that such a clarinet does not have, as
+    /// far as there are. Allocates.
+    pub fn of(file: &InstrumentFile) -> Self {
+        let mut all = BOEHM.clone();
+        for name in BOEHM.unmoved(file) {
+            let is_finger = file.hole(&name).is_some_and(|hole| file.holes[hole].kind == HoleKind::Finger);
+            if !is_finger || all.finger.len() == MAX_FINGERS {
+                continue;
+            }
+            let open =
+                Position { presses: String::new(), closes: String::new(), opens: String::new(), effort: 0 };
+            let covered = Position { presses: name.clone(), closes: name.clone(), ..open.clone() };
+            all.finger.push(Finger { name, positions: vec![open, covered] });
+        }
+        all
+    }
+
+    /// Holes whose kind contradicts what moves them, from the top: a key would open one that stands open at rest, or a finger or pad would close one
+    /// that is closed. Such a hole never moves. With whether it stands open. Allocates.
+    pub fn contrary(&self, file: &InstrumentFile) -> Vec<(String, bool)> {
+        let on = self.on(file);
+        let pads = on.rings.iter().fold(0, |bits, (pad, _)| bits | pad);
+        let all = |of: fn(&Held) -> u64| on.fingers.iter().flatten().fold(0, |bits, held| bits | of(held));
+        let (closes, opens) = (all(|held| held.closes) | pads, all(|held| held.opens));
+        let never = (opens & !closes & on.at_rest) | (closes & !opens & !on.at_rest);
+        let holes = file.holes.iter().enumerate().filter(|(hole, _)| never >> hole & 1 == 1);
+        holes.map(|(hole, of)| (of.name.clone(), on.at_rest >> hole & 1 == 1)).collect()
     }
 
     /// All combinations of open holes that the fingers can make on an instrument, each once, in order of their bits.

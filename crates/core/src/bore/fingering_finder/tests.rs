@@ -8,7 +8,7 @@ static FINDER: LazyLock<FingeringFinder> = LazyLock::new(|| {
     FingeringFinder::new(&FILE, Air::default(), 440.0, &mut |_| ControlFlow::Continue(())).unwrap()
 });
 
-/// Dickens et al. (2007) looked through 39744.
+/// Botros et al. (2006) looked through 39744 of a flute.
 #[test]
 fn no_usual_fingering_is_missed() {
     assert!(FINDER.len() > 39_744, "{}", FINDER.len());
@@ -75,8 +75,31 @@ fn multiphonics_are_of_no_one_harmonic_series() {
 }
 
 #[test]
-fn unknown_holes_are_left_as_they_are_at_rest() {
+fn unknown_keys_are_left_as_they_are_at_rest_and_unknown_finger_holes_have_fingers() {
     let mut file = FILE.clone();
     file.holes.iter_mut().for_each(|hole| hole.name.insert(0, 'x'));
     assert_eq!(Mechanism::boehm().grips(&file).len(), 1);
+    let fingers = file.holes.iter().filter(|hole| hole.kind == HoleKind::Finger).count();
+    let mechanism = Mechanism::of(&file);
+    let grips = mechanism.grips(&file);
+    assert!(fingers == 7 && grips.len() == 1 << fingers, "{fingers}: {}", grips.len());
+    assert_eq!(mechanism.words(&grips[0]).split(' ').count(), fingers, "all covered");
+    assert_eq!(mechanism.unmoved(&file).len(), file.holes.len() - fingers);
+    // Of its own holes a Boehm clarinet has as many fingers as ever.
+    assert_eq!(Mechanism::of(&FILE).grips(&FILE), Mechanism::boehm().grips(&FILE));
+}
+
+#[test]
+fn a_hole_whose_kind_contradicts_its_name_is_told() {
+    assert!(Mechanism::boehm().contrary(&FILE).is_empty());
+    let mut file = FILE.clone();
+    let of = |file: &InstrumentFile, name| file.hole(name).unwrap();
+    let (key, finger) = (of(&file, "A_KEY"), of(&file, "L2"));
+    (file.holes[key].kind, file.holes[finger].kind) = (HoleKind::Finger, HoleKind::KeyClosed);
+    let told = Mechanism::boehm().contrary(&file);
+    assert!(
+        told.contains(&("A_KEY".to_owned(), true)) && told.contains(&("L2".to_owned(), false)),
+        "{told:?}"
+    );
+    assert_eq!(told.len(), 2);
 }

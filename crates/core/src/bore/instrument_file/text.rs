@@ -5,7 +5,7 @@
 
 use std::fmt::Write;
 
-use super::{HoleKind, InstrumentFile};
+use super::InstrumentFile;
 
 /// Decimals of a millimetre at most: a nanometre, far below any workshop.
 const DIGITS: usize = 6;
@@ -68,11 +68,7 @@ impl InstrumentFile {
             out.push_str("\n# Tone holes from the reed to the bell; the chimney from the wall of the bore to the outside.\n");
         }
         for (index, hole) in self.holes.iter().enumerate() {
-            let kind = match hole.kind {
-                HoleKind::Finger => "finger",
-                HoleKind::KeyClosed => "key-closed",
-                HoleKind::PadOpen => "pad-open",
-            };
+            let kind = hole.kind.name();
             let _ = writeln!(
                 out,
                 "{}[[hole]]\nname = {}\nkind = \"{kind}\"\nx_mm = {}\ndiameter_mm = {}\nchimney_mm = {}",
