@@ -11,6 +11,9 @@
 //! - `cache`, `controllers`, `feel_flags`, `folder_listing`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
 //!   `identity` has the names that hosts know the plugin by. They use none of the four.
 
+#[macro_use]
+mod stderr;
+
 pub mod cache;
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -173,7 +173,7 @@ impl NewFile {
         match kept {
             Ok(_) => Ok(()),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(OutputError::Exists(path)),
-            Err(source) => Err(OutputError::Write { path, source }),
+            Err(source) => Err(OutputError::Write { path, source: plain(source) }),
         }
     }
 }
@@ -201,17 +201,17 @@ fn plain(error: io::Error) -> io::Error {
 
 impl io::Write for NewFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.temp.write(bytes)
+        self.temp.write(bytes).map_err(plain)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.temp.flush()
+        self.temp.flush().map_err(plain)
     }
 }
 
 impl io::Seek for NewFile {
     fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
-        self.temp.seek(to)
+        self.temp.seek(to).map_err(plain)
     }
 }
 

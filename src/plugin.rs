@@ -235,6 +235,14 @@ impl Chalumeau {
         true
     }
 
+    /// Ends the link to the knob, and waits until the take that is open is complete. For a program that ends without dropping the
+    /// plugin.
+    #[cfg(feature = "standalone")]
+    pub fn leave_knob(&mut self) {
+        #[cfg(feature = "devices")]
+        drop(self.knob.take());
+    }
+
     /// Silences everything, and forgets notes and breath. Real-time safe.
     pub fn forget(&mut self) {
         self.inputs.reset();
@@ -370,7 +378,8 @@ impl Chalumeau {
             instrument.wait_for(self.params.instrument.choice.value() as u32);
         }
         instrument.receive();
-        let model = instrument.ensemble().first().model();
+        // The new instrument's keys count while the old one fades: what it cannot play, it leaves out.
+        let model = instrument.newest().first().model();
         let of = Some((settings.reach, Arc::as_ptr(model).addr()));
         if std::mem::replace(&mut self.keys_of, of) != of {
             let notes = settings.reach.key_notes(model);

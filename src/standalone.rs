@@ -39,7 +39,7 @@ pub fn main() -> ExitCode {
     let last_error = log::start();
     let lacks_display = !args.no_window && lacks_display();
     if lacks_display {
-        eprintln!(
+        tell!(
             "chalumeau-standalone: no display (DISPLAY is not set), so it plays without a window; press Ctrl-C to quit"
         );
     }
@@ -71,7 +71,7 @@ pub fn main() -> ExitCode {
     // Without this, the program would go on without sound after a panic on a backend's thread.
     let may_try_others = has_window && !args.names_a_place() && usable != DeviceChoice::default();
     std::panic::set_hook(Box::new(move |why| {
-        eprintln!("chalumeau-standalone: {why}");
+        tell!("chalumeau-standalone: {why}");
         if may_try_others && !devices::has_begun() {
             quit::start_without_devices(why.payload_as_str().unwrap_or("for a reason that it does not give"));
         }
@@ -83,7 +83,7 @@ pub fn main() -> ExitCode {
         let failed = failed.as_ref().map(|why| format!("The chosen devices do not play ({why})"));
         let problem = problem(&attempt, &tried).or(failed);
         if let Some(problem) = problem.as_ref().filter(|_| !has_window) {
-            eprintln!("chalumeau-standalone: {problem}; other devices: --output-device, --input-device");
+            tell!("chalumeau-standalone: {problem}; other devices: --output-device, --input-device");
         }
         let problem = problem.map(|problem| format!("{problem}. Choose devices in the Instrument view."));
         LaunchOptions::connect(|now| {
@@ -111,6 +111,7 @@ pub fn main() -> ExitCode {
             }
         };
         if nice_export_standalone_with_args::<StandalonePlugin, _>(words) {
+            StandalonePlugin::end();
             // Windows lets only one program at a time open a MIDI input, and the next start wants it.
             drop(keyboards);
             return quit::end(options);
@@ -127,7 +128,7 @@ pub fn main() -> ExitCode {
         }
         tried.push((attempt, reason));
     }
-    eprintln!("{}", no_backend_message(&tried));
+    tell!("{}", no_backend_message(&tried));
     ExitCode::FAILURE
 }
 
@@ -175,7 +176,7 @@ fn device_list_answer(reason: &str) -> Option<ExitCode> {
         println!("{list}");
         return Some(ExitCode::SUCCESS);
     }
-    eprintln!("chalumeau-standalone: {asked}; available devices:\n{list}");
+    tell!("chalumeau-standalone: {asked}; available devices:\n{list}");
     Some(ExitCode::from(2))
 }
 

@@ -355,7 +355,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("panic", OUTPUT, "Panic", OFF)
         .help(
             "Ends all notes at once",
-            "The sound stops, and the keys set the breath again. As a parameter it acts when it is switched on, and is Off again.",
+            "All notes stop, and the keys set the breath again; a room rings on. As a parameter it acts when it is switched on, and is Off again.",
             "",
         )
         .midi("CC120, CC123")
@@ -554,7 +554,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .only(InUse::InStudy),
     entry("side", KNOB, "A/B", switch(false, ["A", "B"])).help("Side A or B of the trial", "", "").act(),
     entry("hsrc", KNOB, "H from", choice(REED_SOURCES))
-        .help("What drives H", "A controller opens the reed, in the sound and under the hand.", "")
+        .help("What drives H", "A controller opens the reed, in the sound and under the hand. Its stiffness k stays.", "")
         .setup(),
     entry("ksrc", KNOB, "k from", choice(REED_SOURCES))
         .help("What drives k", "A controller stiffens the reed. Meanwhile k is not coupled to H.", "")

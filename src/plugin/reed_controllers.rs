@@ -3,8 +3,8 @@
 //! A controller with a middle (CC74, the y of a Linnstrument) has no effect at its middle, and raises or lowers the
 //! parameter from there. A controller that rests at zero (wheel, pressure) has no effect at zero and only raises the
 //! parameter. What belongs to a note (brightness, pressure) acts while that note is heard. A snapshot of all controllers at the
-//! start of a project changes nothing. Full travel is a factor of 1.6, chosen by judgement: on coupled reeds it makes closing pressures of 2/5 to
-//! 2 1/2 times. A controller that drives the reed does nothing else.
+//! start of a project changes nothing. Full travel is a factor of 1.6, chosen by judgement: on the opening it makes closing pressures of 0.63 to
+//! 1.6 times, since k stays (`Settings::with_reed_factors`). A controller that drives the reed does nothing else.
 
 use nice_plug::prelude::NoteEvent;
 

@@ -64,7 +64,8 @@ impl EventTranslator {
             NoteEvent::MidiPitchBend { channel, value, .. } => self.midi.bend(channel, raw14(value)),
             _ => match expression(event, is_reeds) {
                 Some((address, expression)) => self.midi.express(address, expression),
-                None => &[],
+                // Nothing: what an earlier event has ended is told no more.
+                None => self.midi.nothing(),
             },
         }
     }

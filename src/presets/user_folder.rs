@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::factory;
@@ -89,10 +90,21 @@ impl UserFolder {
             }
         }
         found.presets.sort_by_key(|preset| preset.name.to_lowercase());
-        let text = fs::read_to_string(self.folder.join(FAVOURITES)).unwrap_or_default();
-        found.favourites =
-            text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned).collect();
+        match self.favourites() {
+            Ok(favourites) => found.favourites = favourites,
+            Err(reason) => found.broken.push(reason),
+        }
         found
+    }
+
+    /// What the user likes; nothing where there is no list.
+    fn favourites(&self) -> Result<BTreeSet<String>, String> {
+        let path = self.folder.join(FAVOURITES);
+        let text = match fs::read_to_string(&path) {
+            Err(reason) if reason.kind() == ErrorKind::NotFound => return Ok(BTreeSet::new()),
+            read => read.map_err(|reason| format!("{}: cannot be read: {reason}", path.display()))?,
+        };
+        Ok(text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned).collect())
     }
 
     /// Each file that should be a preset, in the order of their names.
@@ -168,7 +180,8 @@ impl UserFolder {
 
     /// Remembers whether the user likes a preset.
     pub fn set_favourite(&self, name: &str, is_liked: bool) -> Result<(), String> {
-        let mut favourites = self.read().favourites;
+        // A list that cannot be read is not replaced.
+        let mut favourites = self.favourites()?;
         let has_changed = if is_liked { favourites.insert(name.to_owned()) } else { favourites.remove(name) };
         if !has_changed {
             return Ok(());
@@ -200,11 +213,21 @@ impl UserFolder {
 
 /// The preset in a file; the error says what is wrong with it, without its name.
 pub fn read_file(path: &Path) -> Result<Preset, String> {
-    if fs::metadata(path).is_ok_and(|file| file.len() > BYTES_MOST) {
-        return Err(format!("has more than {BYTES_MOST} bytes, so it is no preset; move it elsewhere"));
-    }
+    check_file(path)?;
     let text = text_file::read(path).map_err(|reason| format!("cannot be read: {reason}"))?;
     Preset::parse(&text).map_err(|reason| reason.to_string())
+}
+
+/// What is too large for a preset, or no file at all (a pipe would never end), is not read.
+fn check_file(path: &Path) -> Result<(), String> {
+    let Ok(file) = fs::metadata(path) else { return Ok(()) };
+    if !file.is_file() {
+        return Err("is not a file; move it elsewhere".to_owned());
+    }
+    if file.len() > BYTES_MOST {
+        return Err(format!("has more than {BYTES_MOST} bytes, so it is no preset; move it elsewhere"));
+    }
+    Ok(())
 }
 
 /// A name as files have it.
@@ -216,7 +239,7 @@ fn stem(name: &str) -> String {
 /// By which names a user may look for a file that is no preset, in lower case: its own, and that in its line `name`.
 fn names_of_broken(path: &Path) -> Vec<String> {
     let own = path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
-    let text = text_file::read(path).unwrap_or_default();
+    let text = check_file(path).ok().and_then(|()| text_file::read(path).ok()).unwrap_or_default();
     let inside = text.lines().find_map(|line| {
         let value = line.trim().strip_prefix("name")?.trim_start().strip_prefix('=')?;
         Some(value.split('#').next()?.trim().trim_matches(['"', '\'']).to_lowercase())

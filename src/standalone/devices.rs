@@ -43,7 +43,7 @@ pub fn kept() -> DeviceChoice {
         return DeviceChoice::default();
     };
     serde_json::from_slice(&bytes).unwrap_or_else(|reason| {
-        eprintln!("chalumeau-standalone: cannot read {FILE}: {reason}; sound goes to the default output");
+        tell!("chalumeau-standalone: cannot read {FILE}: {reason}; sound goes to the default output");
         DeviceChoice::default()
     })
 }
@@ -86,7 +86,7 @@ pub fn serve(options: &'static LaunchOptions) {
             match watch.look(BLOCKS.load(Ordering::Relaxed), Instant::now()) {
                 Some(Change::Stopped) => {
                     let problem = "The sound output has stopped. Choose devices in the Instrument view.";
-                    eprintln!("chalumeau-standalone: {problem}");
+                    tell!("chalumeau-standalone: {problem}");
                     LaunchOptions::connect(|now| before = now.problem.replace(problem.to_owned()));
                 }
                 Some(Change::Resumed) => LaunchOptions::connect(|now| now.problem = before.take()),

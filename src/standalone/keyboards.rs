@@ -38,6 +38,9 @@ const ALL_NOTES_OFF: [u8; 3] = [0xB0, 123, 0];
 /// global.
 static INCOMING: Mutex<Option<Consumer<Sent>>> = Mutex::new(None);
 
+/// The keys of one port that are down, a bit each, on sixteen channels.
+type Held = Arc<Mutex<[u128; 16]>>;
+
 /// A message of up to three bytes, and how many they are.
 type Sent = ([u8; 3], usize);
 
@@ -96,7 +99,7 @@ impl Drop for Keyboards {
 }
 
 fn say(text: &str) {
-    eprintln!("chalumeau-standalone: {text}");
+    tell!("chalumeau-standalone: {text}");
 }
 
 /// The keyboards thread's state.
@@ -113,6 +116,7 @@ struct State {
 struct Keyboard {
     id: String,
     name: String,
+    held: Held,
     _connection: MidiInputConnection<()>,
 }
 
@@ -124,19 +128,26 @@ impl State {
         let (stay, gone): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.open).into_iter().partition(|keyboard| ids.contains(&keyboard.id));
         self.open = stay;
-        for Keyboard { name, .. } in gone {
+        for Keyboard { name, held, .. } in gone {
             say(&format!("MIDI input gone: {name}"));
-            // Whoever played these notes cannot release them any more.
-            push(&self.queue, &ALL_NOTES_OFF);
+            // Whoever played these notes cannot release them any more. Those of other keyboards go on.
+            for (channel, keys) in held.lock().unwrap_or_else(PoisonError::into_inner).iter().enumerate() {
+                for key in (0..128).filter(|key| keys >> key & 1 == 1) {
+                    push(&self.queue, &[0x80 | channel as u8, key as u8, 0]);
+                }
+            }
+            if self.open.is_empty() {
+                push(&self.queue, &ALL_NOTES_OFF);
+            }
         }
         for port in ports {
             let id = port.id();
             let is_known = self.refused.contains(&id) || self.open.iter().any(|keyboard| keyboard.id == id);
             match self.list.port_name(&port) {
                 Ok(name) if !is_known && self.is_wanted(&name) => match connected(&port, &self.queue) {
-                    Ok(connection) => {
+                    Ok((connection, held)) => {
                         say(&format!("MIDI input: {name}"));
-                        self.open.push(Keyboard { id, name, _connection: connection });
+                        self.open.push(Keyboard { id, name, held, _connection: connection });
                     }
                     Err(reason) => {
                         say(&format!("the MIDI input {name} does not open: {reason}"));
@@ -176,16 +187,33 @@ impl State {
     }
 }
 
-/// A port whose messages go into the queue.
+/// A port whose messages go into the queue, and the keys that are down there.
 fn connected(
     port: &MidiInputPort,
     queue: &Arc<Mutex<Producer<Sent>>>,
-) -> Result<MidiInputConnection<()>, String> {
+) -> Result<(MidiInputConnection<()>, Held), String> {
     let mut input = MidiInput::new(CLIENT).map_err(|reason| reason.to_string())?;
     input.ignore(Ignore::All);
     let queue = queue.clone();
-    let hear = move |_stamp: u64, bytes: &[u8], _: &mut ()| push(&queue, bytes);
-    input.connect(port, "keyboard", hear, ()).map_err(|reason| reason.to_string())
+    let held = Held::default();
+    let hears = held.clone();
+    let hear = move |_stamp: u64, bytes: &[u8], _: &mut ()| {
+        note_keys(&mut hears.lock().unwrap_or_else(PoisonError::into_inner), bytes);
+        push(&queue, bytes);
+    };
+    let connection = input.connect(port, "keyboard", hear, ()).map_err(|reason| reason.to_string())?;
+    Ok((connection, held))
+}
+
+/// Remembers which keys a message puts down or lets go.
+fn note_keys(held: &mut [u128; 16], bytes: &[u8]) {
+    let &[status, key, velocity] = bytes else { return };
+    let (keys, key) = (&mut held[usize::from(status & 15)], 1 << (key & 127));
+    match status & 0xF0 {
+        0x90 if velocity > 0 => *keys |= key,
+        0x80 | 0x90 => *keys &= !key,
+        _ => {}
+    }
 }
 
 /// Only threads of MIDI wait here for each other.

@@ -63,10 +63,10 @@ impl<S: Subscriber> Layer<S> for LogLayer {
         // The caller explains a backend that does not open. Everything else is printed at once.
         match text.split_once(BACKEND_FAILED).and_then(|(_, rest)| rest.split_once(": ")) {
             Some((_, reason)) => self.0.set(reason),
-            None if text.starts_with(NO_WINDOW) => eprintln!("playing; press Ctrl-C to quit"),
+            None if text.starts_with(NO_WINDOW) => tell!("playing; press Ctrl-C to quit"),
             None if [SIGNALS_TAKEN, MIDI_ADVICE].iter().any(|begin| text.starts_with(begin)) => {}
             None => {
-                eprintln!("{text}");
+                tell!("{text}");
                 if level == Level::ERROR {
                     self.0.set(&text);
                 }

@@ -24,7 +24,7 @@ pub fn listen(options: &'static LaunchOptions) {
     });
     if let Err(reason) = heard {
         // The system then ends the program at once.
-        eprintln!("chalumeau-standalone: cannot catch Ctrl-C: {reason}");
+        tell!("chalumeau-standalone: cannot catch Ctrl-C: {reason}");
     }
 }
 
@@ -36,7 +36,7 @@ pub fn begin(options: &'static LaunchOptions) {
     }
     let _ = std::thread::Builder::new().name("QuitWatch".to_owned()).spawn(move || {
         std::thread::sleep(PATIENCE);
-        eprintln!("chalumeau-standalone: the sound system does not let go; ended without it");
+        tell!("chalumeau-standalone: the sound system does not let go; ended without it");
         end(options);
         std::process::exit(0);
     });
@@ -86,6 +86,6 @@ fn start_again(devices_failed: Option<&str>) -> ExitCode {
 }
 
 fn cannot(reason: &std::io::Error) -> ExitCode {
-    eprintln!("chalumeau-standalone: cannot start again: {reason}. The next start uses the chosen devices");
+    tell!("chalumeau-standalone: cannot start again: {reason}. The next start uses the chosen devices");
     ExitCode::FAILURE
 }

@@ -29,8 +29,14 @@ pub struct Session(Arc<Inside>);
 struct Inside {
     params: Arc<ChalumeauParams>,
     path: PathBuf,
+    written: Mutex<Written>,
+}
+
+struct Written {
     /// What the file contains.
-    written: Mutex<Vec<u8>>,
+    bytes: Vec<u8>,
+    /// The user knows that the file cannot be written.
+    is_told: bool,
 }
 
 /// Begins with the default settings: the session of before is kept beside, under another name.
@@ -50,8 +56,8 @@ fn rename(path: &Path) {
     let mut free = std::iter::once(SET_ASIDE.to_owned()).chain(names).map(|name| path.with_file_name(name));
     let Some(beside) = free.find(|beside| !beside.exists()) else { return };
     match fs::rename(path, &beside) {
-        Ok(()) => eprintln!("chalumeau-standalone: the last session is kept as {}", beside.display()),
-        Err(reason) => eprintln!("chalumeau-standalone: cannot rename {}: {reason}", path.display()),
+        Ok(()) => tell!("chalumeau-standalone: the last session is kept as {}", beside.display()),
+        Err(reason) => tell!("chalumeau-standalone: cannot rename {}: {reason}", path.display()),
     }
 }
 
@@ -83,7 +89,7 @@ impl Session {
                 bytes
             }
             Err(reason) => {
-                eprintln!(
+                tell!(
                     "chalumeau-standalone: cannot read the last session, {}: {reason}; the settings are the default ones",
                     path.display()
                 );
@@ -91,7 +97,11 @@ impl Session {
                 Vec::new()
             }
         };
-        Self(Arc::new(Inside { params, path, written: Mutex::new(written) }))
+        Self(Arc::new(Inside {
+            params,
+            path,
+            written: Mutex::new(Written { bytes: written, is_told: false }),
+        }))
     }
 
     /// Writes the session if it has changed. Says so if it cannot, once.
@@ -99,15 +109,20 @@ impl Session {
         let Inside { params, path, written } = &*self.0;
         // One thread at a time.
         let mut written = written.lock().unwrap_or_else(PoisonError::into_inner);
+        let Written { bytes: written, is_told } = &mut *written;
         let Ok(bytes) = serde_json::to_vec(&params.saved()) else { return };
         if *written == bytes {
             return;
         }
-        if let Err(reason) = output::replace(path, &bytes) {
-            eprintln!("chalumeau-standalone: the next start will not find this session: {reason}");
+        match output::replace(path, &bytes) {
+            Ok(()) => (*written, *is_told) = (bytes, false),
+            // It may have room again the next time, so it is asked again; the user is told once.
+            Err(reason) => {
+                if !std::mem::replace(is_told, true) {
+                    tell!("chalumeau-standalone: the next start will not find this session: {reason}");
+                }
+            }
         }
-        // A folder that refuses is not asked again until something else has changed.
-        *written = bytes;
     }
 }
 

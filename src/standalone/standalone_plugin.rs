@@ -135,12 +135,13 @@ impl Plugin for StandalonePlugin {
 }
 
 impl StandalonePlugin {
-    /// Silences the plugin that plays and leaves the JACK server, before the program ends.
+    /// Silences the plugin that plays, leaves the JACK server, and completes the take that is open, before the program ends.
     pub fn end() {
         // In a statement of its own: the framework may be about to do the same.
         let playing = locked(&PLAYING).take();
         if let Some(playing) = playing {
             playing.silence();
+            locked(&playing.plugin).leave_knob();
         }
     }
 

@@ -49,12 +49,12 @@ pub enum Event {
         /// Cents above the note.
         cents: f32,
     },
-    /// Controllers open and stiffen the reed: factors on [`Settings`](crate::instrument::Settings)' H and k. While these are `coupled`, k
-    /// follows H, and the factor on k does nothing.
+    /// Controllers open and stiffen the reed: factors on [`Settings`](crate::instrument::Settings)' H and k. Where these are `coupled`, k is
+    /// that of H without its factor.
     Reed {
         /// On H, 0.1..=10; 1 leaves it.
         h: f32,
-        /// On k, 0.1..=10; 1 leaves it. Nothing while H and k are coupled.
+        /// On k, 0.1..=10; 1 leaves it.
         k: f32,
     },
     /// Depth of the vibrato, 0..=1, added to that of the [`Settings`](crate::instrument::Settings).

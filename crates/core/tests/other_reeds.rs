@@ -125,3 +125,38 @@ fn natural_the_same_reeds_put_notes_elsewhere() {
     );
     assert!(quantile(&mezzo_forte, 0.5) > 4.0 && quantile(&mezzo_forte, 1.0) > 25.0);
 }
+
+/// Full travel of a controller that opens the reed, either way.
+const TRAVEL: f32 = 1.6;
+
+#[test]
+fn a_reed_that_a_controller_opens_keeps_every_note_in_tune() {
+    let wanted = Wanted::new(Bundled::BFlat.file(), RATE_HZ);
+    let model = Arc::new(Preparation::new(&wanted, None).ready().expect("it comes prepared").unwrap());
+    let notes: Vec<WrittenNote> = model.file.fingerings.iter().map(|fingering| fingering.written).collect();
+    let notes: Vec<WrittenNote> = notes.into_iter().step_by(if some::all_cases() { 1 } else { 4 }).collect();
+    let settings = settings([2.5, 1.0, 0.3, 1.0, 0.4], Tuning::Tempered);
+    let cases = 2 * notes.len();
+    let each = parallel::each(
+        cases,
+        |at| {
+            let (h, written) = ([1.0 / TRAVEL, TRAVEL][at % 2], notes[at / 2]);
+            let note = written.sounding(model.file.transposition)?;
+            let events = [
+                Event::Breath(70.0 / 127.0),
+                Event::Reed { h, k: 1.0 },
+                Event::NoteOn { note, velocity: 0.8 },
+            ];
+            let heard = rendered(&model, RATE_HZ, &settings, &events.map(|event| (0.0, event)), NOTE_S);
+            let hz = fundamental_hz(&heard[(STEADY_S * RATE_HZ) as usize..], RATE_HZ)?;
+            Some((written, h, cents(hz, note.frequency_hz(440.0))))
+        },
+        &mut |_| ControlFlow::Continue(()),
+    )
+    .unwrap();
+    let heard: Vec<_> = each.into_iter().flatten().collect();
+    assert!(heard.len() + 2 >= cases, "{} of {cases} are heard", heard.len());
+    let worst = heard.iter().map(|(_, _, off)| off.abs()).fold(0.0, f64::max);
+    println!("{} notes, all within {worst:.1} cents", heard.len());
+    assert!(worst < 10.0, "{heard:?}");
+}

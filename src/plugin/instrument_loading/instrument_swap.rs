@@ -99,6 +99,11 @@ impl InstrumentSwap {
         &self.playing
     }
 
+    /// Those who will play, if others fade in, else those who play.
+    pub fn newest(&self) -> &Ensemble {
+        self.next.as_ref().map_or(&self.playing, |next| &next.ensemble)
+    }
+
     /// Whether neither the instrument nor its room sounds: the host may stop calling.
     pub fn is_silent(&self) -> bool {
         self.playing.is_silent() && self.stereo.room().is_silent()
@@ -125,7 +130,12 @@ impl InstrumentSwap {
         self.settings = *settings;
         self.stereo.set_space(settings);
         let was_lone = self.playing.is_lone();
+        let is_other_group = self.playing.first().settings().players != settings.players;
         self.playing.set_settings(settings);
+        if self.is_unheard && is_other_group {
+            // Players who came before anything was heard begin like the others: two bounces are alike.
+            self.playing.reset();
+        }
         if self.playing.is_lone() != was_lone {
             self.stereo.hand_over_pan(was_lone, self.playing.pan());
         }
@@ -147,6 +157,8 @@ impl InstrumentSwap {
             && !self.shared.stop.load(Ordering::Relaxed)
             && began.elapsed() < LONGEST_WAIT
         {
+            // The loader answers once it has handed over everything, and for that it needs room.
+            self.receive();
             std::thread::sleep(Duration::from_millis(1));
         }
     }

@@ -79,7 +79,7 @@ impl Editor for HostWindow {
         }
         if let (Err(reason), Some(options)) = (&spawned, LaunchOptions::get()) {
             // The framework tells the reason when the program ends, if at all.
-            eprintln!("chalumeau-standalone: the window does not open: {reason}");
+            tell!("chalumeau-standalone: the window does not open: {reason}");
             options.window_failed.store(true, Ordering::Relaxed);
         }
         spawned

@@ -67,6 +67,10 @@ pub struct WindowAudio {
     keys: rtrb::Consumer<Event>,
     /// Number of the picture that was sent last.
     shown: u64,
+    /// The fingering that the window tries.
+    tried: Option<u64>,
+    /// The player has been reset, and has to be told of it again.
+    is_to_retry: bool,
 }
 
 /// The other ends of its channels.
@@ -85,7 +89,15 @@ impl WindowAudio {
         let (inside_in, inside) = triple_buffer::triple_buffer(&AudioSnapshot::default());
         let (sound_in, sound) = rtrb::RingBuffer::new(SOUND_SAMPLES);
         let (keys_in, keys) = rtrb::RingBuffer::new(KEY_EVENTS);
-        let audio = Self { shared, inside: inside_in, sound: sound_in, keys, shown: 0 };
+        let audio = Self {
+            shared,
+            inside: inside_in,
+            sound: sound_in,
+            keys,
+            shown: 0,
+            tried: None,
+            is_to_retry: false,
+        };
         (audio, WindowChannels { inside, sound, keys: keys_in })
     }
 
@@ -96,12 +108,22 @@ impl WindowAudio {
 
     /// The key events of the window since the last block. Real-time safe.
     pub fn keys(&mut self) -> [Option<Event>; KEYS_PER_BLOCK] {
-        std::array::from_fn(|_| self.keys.pop().ok())
+        let mut again = std::mem::take(&mut self.is_to_retry).then_some(Event::TryHoles(self.tried));
+        std::array::from_fn(|_| again.take().or_else(|| self.next_key()))
     }
 
-    /// Drops the key events that came while nothing played. Real-time safe.
+    /// Drops the key events that came while nothing played. A fingering that is tried stays: the window shows it. Real-time safe.
     pub fn forget_keys(&mut self) {
-        while self.keys.pop().is_ok() {}
+        while self.next_key().is_some() {}
+        self.is_to_retry = self.tried.is_some();
+    }
+
+    fn next_key(&mut self) -> Option<Event> {
+        let event = self.keys.pop().ok()?;
+        if let Event::TryHoles(tried) = event {
+            self.tried = tried;
+        }
+        Some(event)
     }
 
     /// Notes how loud the output is while the window is open. Real-time safe.

@@ -120,7 +120,7 @@ impl JackLink {
         let is_running = thread.is_ok();
         // A program that says that it plays shall do so. A server that hangs is said here: the thread waits for it.
         if told.recv_timeout(BEGINNING) == Err(RecvTimeoutError::Timeout) {
-            eprintln!("chalumeau-standalone: {STALLED} {QUIT}");
+            tell!("chalumeau-standalone: {STALLED} {QUIT}");
         }
         *self.thread.lock().unwrap_or_else(PoisonError::into_inner) = thread.ok();
         is_running
@@ -183,9 +183,7 @@ impl LinkThread {
             }
             // A server without a sound card lacks the others, which is no mistake of the user.
             for Connection { other, .. } in self.pending.iter().filter(|connection| connection.is_named()) {
-                eprintln!(
-                    "chalumeau-standalone: JACK has no port {other:?} yet; `jack_lsp` lists what it has"
-                );
+                tell!("chalumeau-standalone: JACK has no port {other:?} yet; `jack_lsp` lists what it has");
             }
         }
         let mut tried_at = Instant::now();
@@ -205,7 +203,7 @@ impl LinkThread {
     /// Says something, unless it was just said.
     fn say(&mut self, text: &str) {
         if self.last_words != text {
-            eprintln!("chalumeau-standalone: {text}");
+            tell!("chalumeau-standalone: {text}");
             text.clone_into(&mut self.last_words);
         }
     }
@@ -320,7 +318,7 @@ impl LinkThread {
         let Some(known) = &mut self.keyboards else { return };
         let there: HashSet<_> = client.keyboards().into_iter().collect();
         for other in there.difference(known) {
-            eprintln!("chalumeau-standalone: MIDI input: {other}");
+            tell!("chalumeau-standalone: MIDI input: {other}");
             self.pending.push(Connection { own: MIDI_INPUT, other: other.clone() });
         }
         *known = there;

@@ -59,6 +59,15 @@ impl Default for Bends {
 }
 
 impl Bends {
+    /// All wheels at rest, before any note. Zones and ranges stay: a controller tells them once, when it is switched on.
+    #[must_use]
+    pub fn at_rest(mut self) -> Self {
+        for wheel in &mut self.wheels {
+            (wheel.at, wheel.played) = (CENTRE, false);
+        }
+        Self { usual: RANGE, common: None, ..self }
+    }
+
     /// What the wheels bend the heard note by, cents.
     pub fn cents(&self, heard: Option<usize>) -> f32 {
         let Some(channel) = heard else { return self.common_cents(None) };

@@ -102,10 +102,10 @@ impl MidiDecoder {
         self
     }
 
-    /// Forgets everything: notes, controllers, breath source, zones and bend ranges, and also links, what the wheel does, which
-    /// controllers may blow, and the usual bend range. Real-time safe.
+    /// Forgets notes, controllers and breath source, and also links, what the wheel does, which controllers may blow, and the usual
+    /// bend range; all but MPE zones and the bend ranges that were told, which a device tells once. Real-time safe.
     pub fn reset(&mut self) {
-        *self = Self::new();
+        *self = Self { bends: self.bends.clone().at_rest(), ..Self::new() };
     }
 
     /// Bend range until RPN 0 says otherwise, semitones; of MPE members it is 48. Real-time safe.

@@ -189,6 +189,12 @@ impl Parts {
         self.decoders[part].links()
     }
 
+    /// A message that says nothing, and ends no note.
+    pub fn nothing(&mut self) -> &[PartEvent] {
+        self.begin();
+        &self.said
+    }
+
     /// See [`MidiDecoder::note_on`].
     pub fn note_on(&mut self, channel: u8, key: u8, velocity: u8) -> &[PartEvent] {
         if velocity == 0 {

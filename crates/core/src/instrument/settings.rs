@@ -282,12 +282,14 @@ impl Settings {
     }
 
     /// These settings with H and k multiplied by the factors of controllers; see
-    /// [`Event::Reed`](crate::event::Event::Reed). Real-time safe.
+    /// [`Event::Reed`](crate::event::Event::Reed). A coupled k stays as H without its factor has it: a reed that a controller
+    /// opens keeps its stiffness, else it would be softer by the third power, and notes would leave their register. Real-time safe.
     pub fn with_reed_factors(self, [h, k]: [f32; 2]) -> Self {
         if [h, k] == [1.0, 1.0] {
             return self;
         }
-        Self { reed_h: self.reed_h * h, reed_k: self.reed_k * k, ..self }.clamped()
+        let own_k = if self.coupled { coupled_k(f64::from(self.reed_h)) as f32 } else { self.reed_k };
+        Self { reed_h: self.reed_h * h, reed_k: own_k * k, coupled: false, ..self }.clamped()
     }
 
     /// These settings with the reed as a player's lip shapes it: what meters and drawings of the played reed need. Real-time

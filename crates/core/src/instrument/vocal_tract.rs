@@ -9,8 +9,8 @@
 //! Z(s) = Z_p (w/Q) s / (s^2 + (w/Q) s + w^2)
 //! ```
 //!
-//! by the trapezoidal rule, prewarped at `w`. Its two states are normalised to energy: half their squares' sum is what the
-//! air in the mouth holds. So no movement of the tract makes energy, however quick: in each sample the circuit takes up
+//! by the trapezoidal rule, prewarped at `w`. Its two states are normalised to energy: a quarter of their squares' sum is what
+//! the air in the mouth holds. So no movement of the tract makes energy, however quick: in each sample the circuit takes up
 //! exactly what the flow gives it, less its loss. Only the part `b0` of the impedance acts at once, and it joins the bore's in
 //! the reed's equation, which stays closed. The model leaves out all other resonances of the tract, and its walls.
 //!

@@ -1,7 +1,8 @@
 //! The curved lay: how a reed closes that rolls onto its mouthpiece.
 
 /// How far a reed is open, over its rest opening, and how much less for more pressure: `gap` is what a straight reed would be open, which goes to 0 at
-/// the closing pressure, and `half` the half-width of the parabola that takes the place of that corner, above 0. Real-time safe.
+/// the closing pressure, and `half` the half-width of the parabola that takes the place of that corner, above 0.
+/// Above 1 the reed lies on the curve even at rest, where it is then open by `(1 + half)^2 / (4 half)`. Real-time safe.
 ///
 /// ```
 /// use chalumeau_core::reed::lay::opening;

@@ -9,7 +9,7 @@
 //! | `H / H_init` | `H_m / H_m,ref` |
 //! | `k / k_init` | `(K / A_r) / (K_ref / A_ref)` |
 //! | `zeta A / 0.3` | `w / w_ref` |
-//! | `area` | `A_r / A_ref`: enters the closing pressure, and otherwise only the air that the reed's motion displaces |
+//! | `area` | `A_r / A_ref`: enters the closing pressure, and the air that the reed's motion displaces; the sound takes that air from the instrument file |
 //!
 //! The closing pressure is `p_M = K H_m / A_r = P_ref H k` in both. [`DimensionlessReed`] keeps A apart from zeta and also
 //! keeps the area, so that nothing is lost in either direction. Settings store and play the dimensionless numbers; the

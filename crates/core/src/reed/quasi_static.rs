@@ -3,7 +3,8 @@
 //!
 //! The flow is the law of [`law`](crate::reed::law) read from the tables, scaled to zeta:
 //! `u = zeta 2/(3 sqrt 3) A (H x_a[p] - x_b[p] / k)`. The bore's load line `p + kappa u(p) = X` meets it once while
-//! `kappa zeta < 1`; a closed-form root of the exact law starts a bracketed Newton iteration on the tables. The air
+//! `kappa zeta A sqrt(r e_c) < 1`, with `r = k_ref / k` and `e_c = H k_ref` (for the reference law: `kappa zeta < 1`); beyond that it finds one
+//! of its roots. A closed-form root of the exact law starts a bracketed Newton iteration on the tables. The air
 //! volume the reed displaces is a compliance at the tip, by the trapezoidal rule. What this leaves out: the reed's
 //! resonance, the lay's curve, the tongue.
 //!

@@ -21,6 +21,7 @@ use crate::event::{Event, PartEvent, Timed};
 use crate::score::samples::SECONDS_MAX;
 use crate::score::timeline::Score;
 use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
+use std::collections::HashMap;
 pub use tracks::{Tracks, read_tracks};
 
 /// Microseconds in a quarter note until the file sets a tempo (Standard MIDI Files 1.0).
@@ -181,7 +182,7 @@ pub fn read(bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
 ///
 /// As [`read`].
 pub fn read_parts(parts: &mut Parts, bytes: &[u8], rate: u32) -> Result<Score<PartEvent>, MidiFileError> {
-    let (mut clock, messages) = merged(bytes)?;
+    let (mut clock, messages) = merged(bytes, Hands::OfAll)?;
     let (mut events, mut tick, mut notes) = (Vec::new(), 0, 0usize);
     for message in messages {
         clock.advance(message.tick - tick);
@@ -229,8 +230,17 @@ fn decode(parts: &mut Parts, channel: u8, message: MidiMessage) -> &[PartEvent] 
     }
 }
 
+/// Whose keys a channel's are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Hands {
+    /// The channel's, in whatever tracks it is.
+    OfAll,
+    /// Each track has its own, though they share a channel.
+    OfTrack,
+}
+
 /// The messages of all tracks, in order of time.
-fn merged(bytes: &[u8]) -> Result<(Clock, Vec<Message<'_>>), MidiFileError> {
+fn merged(bytes: &[u8], hands: Hands) -> Result<(Clock, Vec<Message<'_>>), MidiFileError> {
     // A RIFF wrapper (.rmi) holds an ordinary file further in.
     let start = if bytes.starts_with(b"RIFF") { find(bytes, b"MThd").unwrap_or(0) } else { 0 };
     let file = &bytes[start..];
@@ -271,15 +281,18 @@ fn merged(bytes: &[u8]) -> Result<(Clock, Vec<Message<'_>>), MidiFileError> {
         return Err(MidiFileError::Tracks { announced, found: track });
     }
     messages.sort_by_key(|m: &Message| m.tick);
-    let mut held = [false; 16 * 128];
+    let mut held = HashMap::new();
     for together in messages.chunk_by_mut(|a, b| a.tick == b.tick) {
-        end_before_beginning(together, &mut held);
+        end_before_beginning(together, hands, &mut held);
     }
-    Ok((clock, apart(messages)))
+    Ok((clock, apart(messages, hands)))
 }
 
-/// The place of a key among all keys of all channels, and whether the message strikes it or lets it go.
-fn key_of(message: &Message) -> Option<(usize, bool)> {
+/// A key: its track, where each has its own; its channel, and its number.
+type KeyOf = (usize, u8, u8);
+
+/// The key of a message, and whether the message strikes it or lets it go.
+fn key_of(message: &Message, hands: Hands) -> Option<(KeyOf, bool)> {
     let (channel, key, is_down) = match message.kind {
         TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } => {
             (channel, key, vel > 0)
@@ -287,32 +300,36 @@ fn key_of(message: &Message) -> Option<(usize, bool)> {
         TrackEventKind::Midi { channel, message: MidiMessage::NoteOff { key, .. } } => (channel, key, false),
         _ => return None,
     };
-    Some((usize::from(channel.as_int()) * 128 + usize::from(key.as_int()), is_down))
+    let track = if hands == Hands::OfTrack { message.track } else { 0 };
+    Some(((track, channel.as_int(), key.as_int()), is_down))
 }
 
 /// Notes of one key that overlap, apart: the earlier one ends where the later one begins, and its own end is left out. Only of keys that
 /// come up as often as they are struck; where ends are missing, it cannot be told whose they are.
-fn apart(messages: Vec<Message<'_>>) -> Vec<Message<'_>> {
-    let mut balance = [0_i32; 16 * 128];
-    let keys = messages.iter().filter_map(key_of);
-    keys.for_each(|(key, is_down)| balance[key] += if is_down { 1 } else { -1 });
-    let mut held = [0_u32; 16 * 128];
+fn apart(messages: Vec<Message<'_>>, hands: Hands) -> Vec<Message<'_>> {
+    let mut balance: HashMap<KeyOf, i32> = HashMap::new();
+    for (key, is_down) in messages.iter().filter_map(|message| key_of(message, hands)) {
+        *balance.entry(key).or_default() += if is_down { 1 } else { -1 };
+    }
+    let mut held: HashMap<KeyOf, u32> = HashMap::new();
     let mut all = Vec::with_capacity(messages.len());
     for message in messages {
-        match key_of(&message).filter(|&(key, _)| balance[key] == 0) {
+        match key_of(&message, hands).filter(|(key, _)| balance.get(key) == Some(&0)) {
             Some((key, true)) => {
-                if held[key] > 0
+                let held = held.entry(key).or_default();
+                if *held > 0
                     && let TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } =
                         message.kind
                 {
                     let up = TrackEventKind::Midi { channel, message: MidiMessage::NoteOff { key, vel } };
                     all.push(Message { kind: up, ..message });
                 }
-                held[key] += 1;
+                *held += 1;
             }
             Some((key, false)) => {
-                held[key] = held[key].saturating_sub(1);
-                if held[key] > 0 {
+                let held = held.entry(key).or_default();
+                *held = held.saturating_sub(1);
+                if *held > 0 {
                     continue;
                 }
             }
@@ -325,17 +342,18 @@ fn apart(messages: Vec<Message<'_>>) -> Vec<Message<'_>> {
 
 /// Messages of one tick. A key that is held, and struck again where it ends, ends first: otherwise its end would end the new note.
 /// Files with several tracks have these two in any order. `held` says which keys are, of all channels.
-fn end_before_beginning(together: &mut [Message], held: &mut [bool; 16 * 128]) {
+fn end_before_beginning(together: &mut [Message], hands: Hands, held: &mut HashMap<KeyOf, bool>) {
     let mut at = 0;
     while at < together.len() {
-        if let Some((key, true)) = key_of(&together[at])
-            && held[key]
-            && let Some(end) = together[at..].iter().position(|message| key_of(message) == Some((key, false)))
+        if let Some((key, true)) = key_of(&together[at], hands)
+            && held.get(&key) == Some(&true)
+            && let Some(end) =
+                together[at..].iter().position(|message| key_of(message, hands) == Some((key, false)))
         {
             together[at..=at + end].rotate_right(1);
         }
-        if let Some((key, is_down)) = key_of(&together[at]) {
-            held[key] = is_down;
+        if let Some((key, is_down)) = key_of(&together[at], hands) {
+            held.insert(key, is_down);
         }
         at += 1;
     }

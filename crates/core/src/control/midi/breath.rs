@@ -91,7 +91,8 @@ pub enum Part {
 /// A controller with a coarse and, on some devices, a fine part.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fader {
-    coarse: u8,
+    /// `None` until it comes: a fine part alone says nothing, and is often another device's button.
+    coarse: Option<u8>,
     /// `None` until the device has shown that it sends one.
     fine: Option<u8>,
 }
@@ -99,18 +100,19 @@ struct Fader {
 impl Fader {
     fn set(&mut self, part: Part) {
         match part {
-            Part::Coarse(value) => self.coarse = value,
+            Part::Coarse(value) => self.coarse = Some(value),
             Part::Fine(value) => self.fine = Some(value),
         }
     }
 
     /// 0..=1: 127ths as long as only the coarse part is known, 16383rds afterwards. The fine part is kept when a coarse
     /// part follows (the specification would zero it), so that devices sending the fine part first end right too.
-    fn unit(self) -> f32 {
-        match self.fine {
-            None => f32::from(self.coarse) / 127.0,
-            Some(fine) => f32::from(u16::from(self.coarse) * 128 + u16::from(fine)) / 16383.0,
-        }
+    fn unit(self) -> Option<f32> {
+        let coarse = self.coarse?;
+        Some(match self.fine {
+            None => f32::from(coarse) / 127.0,
+            Some(fine) => f32::from(u16::from(coarse) * 128 + u16::from(fine)) / 16383.0,
+        })
     }
 }
 
@@ -183,8 +185,8 @@ impl BreathChoice {
             return None;
         }
         claim.fader.set(part);
+        let unit = claim.fader.unit()?;
         claim.message = self.messages;
-        let unit = claim.fader.unit();
         let before = claim.unit.replace(unit);
         if self.heard >= Some(controller) {
             return (self.heard == Some(controller)).then_some(Heard::Breath(unit));
@@ -214,7 +216,7 @@ impl BreathChoice {
             claim.waits = false;
             if self.heard != Some(controller) {
                 claim.fader.fine = None;
-                claim.unit = claim.unit.map(|_| claim.fader.unit());
+                claim.unit = claim.unit.and_then(|_| claim.fader.unit());
             }
         }
     }

@@ -337,6 +337,33 @@ fn an_announced_zone_bends_by_48_semitones_and_its_manager_by_2() {
 }
 
 #[test]
+fn a_zone_and_its_ranges_outlive_a_reset_of_the_host() {
+    let mut midi = MidiDecoder::new();
+    for (cc, value) in [(101, 0), (100, 6), (6, 15), (101, 127), (100, 127)] {
+        midi.controller(0, cc, value);
+    }
+    midi.note_on(1, 60, 90);
+    assert_eq!(midi.bend(1, 16383), [bend(4_800.0)]);
+    midi.reset();
+    midi.note_on(1, 60, 90);
+    assert_eq!(midi.bend(1, 16383), [bend(4_800.0)], "but the wheel itself was at rest");
+}
+
+/// A remote control sends CC34 and CC43 as buttons.
+#[test]
+fn a_fine_part_without_its_coarse_part_is_no_breath() {
+    for cc in [34, 43] {
+        let mut midi = MidiDecoder::new();
+        assert_eq!(midi.controller(0, cc, 100), NOTHING);
+        assert_eq!(midi.note_on(0, 60, 127), [on(60)], "velocity blows");
+        assert_eq!(midi.controller(0, cc, 127), NOTHING);
+        assert_eq!(midi.controller(0, cc, 0), NOTHING);
+        // With its coarse part it is fine again.
+        assert_eq!(midi.controller(0, cc - 32, 64), [Event::Breath(64.0 * 128.0 / 16383.0)]);
+    }
+}
+
+#[test]
 fn the_upper_zone_counts_down_and_gives_way() {
     let mut midi = MidiDecoder::new().with_mpe();
     for (cc, value) in [(101, 0), (100, 6), (6, 5)] {

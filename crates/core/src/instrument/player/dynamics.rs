@@ -107,7 +107,7 @@ impl PlayerModel {
     /// The rule that comes with the program.
     pub const FITTED: Self = super::fitted::FITTED;
 
-    /// Place of a note: -1 at the lowest note of its instrument, 1 three octaves and a fifth above.
+    /// Place of a note: -1 at the lowest note of its instrument, 1 three octaves and a fourth above.
     pub fn place(note_hz: f64, lowest_hz: f64) -> f64 {
         (maths::log2(note_hz / lowest_hz) / HALF_COMPASS_OCTAVES - 1.0).clamp(-FARTHEST, FARTHEST)
     }

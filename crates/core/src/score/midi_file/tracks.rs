@@ -5,7 +5,7 @@
 //! own. Key switches are no notes, and make no line. A message of no line, for example a controller in a track without notes, goes to the lines with notes on its channel,
 //! or to all if there are none.
 
-use super::{MidiFileError, decode, end, merged};
+use super::{Hands, MidiFileError, decode, end, merged};
 use crate::control::key_switches::KeySwitches;
 use crate::control::midi::MidiDecoder;
 use crate::control::parts::{MOST, Parts, Unplayed};
@@ -57,7 +57,7 @@ pub fn read_tracks(
     bytes: &[u8],
     rate: u32,
 ) -> Result<Tracks, MidiFileError> {
-    let (mut clock, messages) = merged(bytes)?;
+    let (mut clock, messages) = merged(bytes, Hands::OfTrack)?;
     let noted = messages.iter().filter_map(|message| match message.kind {
         TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } => {
             let is_note = vel > 0 && key_switches.chosen(key.as_int()).is_none();
@@ -203,6 +203,28 @@ mod tests {
         let Tracks { score, .. } =
             read_tracks(&MidiDecoder::new(), (KeySwitches::Off, u128::MAX), &bytes, 48_000).unwrap();
         assert_eq!(score.samples, 48_000, "a beat of a second");
+    }
+
+    /// Two parts that meet on one note, in tracks that share a channel.
+    #[test]
+    fn tracks_that_play_one_key_of_one_channel_end_it_each_for_itself() {
+        let one = [&[0, 0x90, 60, 64, 96, 0x80, 60, 0][..], &END].concat();
+        let two = [&[48, 0x90, 60, 64, 96, 0x80, 60, 0][..], &END].concat();
+        let (events, _) = lines_of(1, &[&one, &two]);
+        let of = |player: u8| {
+            let of_player = events.iter().filter(move |event| event.to == To::Player(player));
+            of_player
+                .filter(|event| matches!(event.event, Event::NoteOn { .. } | Event::NoteOff { .. }))
+                .count()
+        };
+        assert_eq!((of(0), of(1)), (2, 2), "{events:?}");
+        // The same for one player is a note that is struck again.
+        let score = super::super::read(&file(1, [0, 96], &[&one, &two]), 48_000).unwrap();
+        let at = |want: fn(&Event) -> bool| {
+            score.events.iter().filter(|timed| want(&timed.event)).map(|timed| timed.at).collect::<Vec<_>>()
+        };
+        assert_eq!(at(|event| matches!(event, Event::NoteOn { .. })), [0, 12_000]);
+        assert_eq!(at(|event| matches!(event, Event::NoteOff { .. })), [12_000, 36_000]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Flutter tongue: the tip of the tongue rolls an R and nearly closes the breath's way, some 25 times a second.
 //!
-//! The tongue lies between lungs and reed. What it holds back gathers behind it and comes when it opens, so the mean stays:
+//! The tongue lies between lungs and reed. What it holds back gathers behind it and comes when it opens, so the mean stays (but for
+//! a loud note, whose pressure ends at the closing pressure):
 //! a soft note, whose growth follows the mean pressure, goes on.
 
 use crate::maths;

@@ -1,7 +1,7 @@
 //! Growl: the player sings, and the voice's pulses of air come into the mouth.
 //!
 //! The glottis opens and closes with the voice, and lets the breath through in pulses: a rise of 40 % of the period and a
-//! fall of 16 %, both of trigonometric form (Rosenberg 1971, shape B, in JASA 49, 583), then closed. The mouth's air is a
+//! fall of 16 %, both of trigonometric form (Rosenberg 1971, shape C, in JASA 49, 583), then closed. The mouth's air is a
 //! compliance that the pulses fill and the reed empties, so that the mouth pressure swings about its mean `p` by `p m`:
 //!
 //! ```text
