@@ -118,6 +118,7 @@ pub fn main() -> ExitCode {
         }
         if options.window_failed.load(Ordering::Relaxed) {
             // It has played without a window, and the framework has logged why there was none.
+            StandalonePlugin::end();
             return ExitCode::SUCCESS;
         }
         let reason = last_error.get().unwrap_or_else(|| "it gave no reason".to_owned());

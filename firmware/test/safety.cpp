@@ -549,6 +549,31 @@ CLAIM(rule_5_a_wall_beyond_the_ceiling_is_gone_in_morph_ms) {
     CHECK(std::fabs(last + 100.0F) < 1e-2F);
 }
 
+CLAIM(rule_5_a_ceiling_that_is_raised_during_a_change_waits_for_its_end) {
+    Bench bench;
+    Feel feel = held_feel();
+    feel.wall_deg = 400.0F;
+    bench.ready(feel, 10800, 100);
+    bench.run(50);
+    // A smaller wall, still beyond the ceiling at both ends of the change, and back.
+    Feel none = feel;
+    none.law = static_cast<std::uint8_t>(Law::Free);
+    none.morph_ms = 100;
+    feel.morph_ms = 100;
+    bench.feel(none);
+    bench.run(20);
+    bench.feel(feel);
+    bench.ceiling_mnm = 400;
+    bench.arm(400);
+    float last = bench.run(1);
+    for (int i = 0; i < 600; ++i) {
+        const float torque = bench.run(1);
+        CHECK(std::fabs(torque - last) < 2.6F);
+        last = torque;
+    }
+    CHECK(std::fabs(last + 400.0F) < 1.0F);
+}
+
 CLAIM(rule_6_a_refused_feel_leaves_the_one_before_and_says_why) {
     Bench bench;
     bench.ready(held_feel(), 1200);

@@ -59,7 +59,8 @@ pub fn watched<T, E: Display>(work: impl FnOnce(fn() -> bool) -> Result<T, E>) -
 pub fn warn(said: &str) {
     let said = ["note: ", "warning: "].iter().find_map(|mark| said.strip_prefix(mark)).unwrap_or(said);
     let warned = Python::attach(|py| {
-        let stacklevel = [("stacklevel", 1 + frames_within(py)?)].into_py_dict(py)?;
+        // Where nobody knows who called, Python's usual place.
+        let stacklevel = [("stacklevel", 1 + frames_within(py).unwrap_or(0))].into_py_dict(py)?;
         py.import("warnings")?.call_method("warn", (advised(said),), Some(&stacklevel)).map(drop)
     });
     if let Err(raised) = warned {
@@ -72,7 +73,10 @@ fn frames_within(py: Python<'_>) -> PyResult<usize> {
     let mut frame = py.import("sys")?.call_method1("_getframe", (0,))?;
     let mut count = 0;
     while !frame.is_none() {
-        let module: String = frame.getattr("f_globals")?.get_item("__name__")?.extract()?;
+        // Code of `exec` may have no name; then it is the user's.
+        let module =
+            frame.getattr("f_globals")?.call_method1("get", ("__name__", ""))?.extract().unwrap_or_default();
+        let module: String = module;
         if module != "chalumeau" && !module.starts_with("chalumeau.") {
             break;
         }

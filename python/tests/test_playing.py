@@ -1,7 +1,9 @@
 """Sound: the same bits as the golden hashes, the command line and every cut of time."""
 
 import hashlib
+import os
 import subprocess
+import sys
 import threading
 import time
 import warnings
@@ -188,7 +190,7 @@ def test_mistakes_say_what_was_given_and_what_to_do(tmp_path):
     text = tmp_path / "text.mid"
     text.write_text("once upon a time")
     for make, kind, says in [
-        (lambda: chalumeau.render(), ValueError, "required"),
+        (lambda: chalumeau.render(), ValueError, "nothing to play"),
         (lambda: chalumeau.render(written="H4"), ValueError, "a name like E3"),
         (lambda: chalumeau.render(written="C4", zeta=3), ValueError, "0.05..0.9"),
         (lambda: chalumeau.render(written="C4", settings={"Embouchure": "loud"}), ValueError, "zeta"),

@@ -93,7 +93,7 @@ impl FingeringsCommand {
             .ok_or_else(|| Failure::Usage("the search was ended".to_owned()))?;
         if !finder.unmoved().is_empty() {
             say!(
-                "warning: {} cannot be moved: no key of the search has such a name; it stays as at rest, closed if key-closed, open if pad-open. The names that the search knows: docs/instrument-file.md",
+                "warning: {} cannot be moved: the search knows no key or finger of such a name. It stays as at rest: key-closed is closed, all others are open. The names that the search knows: docs/instrument-file.md",
                 finder.unmoved().join(" ")
             );
         }

@@ -458,7 +458,9 @@ impl ScoreArgs {
         }
         if let Some(path) = &self.midi {
             let bytes = match &self.given {
-                Some(Given::Notes(notes)) => return Ok(score_of_parts(notes, self.rate, players.parts())),
+                Some(Given::Notes(notes)) => {
+                    return Ok(score_of_parts(notes, self.rate, players.parts(), playing));
+                }
                 Some(Given::Midi { bytes, .. }) => bytes.clone(),
                 None => fs::read(path).map_err(|source| no_such_piece(path, source))?,
             };

@@ -32,8 +32,9 @@ const MEASURE_S: f64 = 0.6;
 /// through which no air flows (--A 0) moves at most as loud as -71 dBFS.
 const SILENT_DBFS: f64 = -65.0;
 
-/// A note that is so far off where the others are not has another name than its holes. As `docs/instrument-file.md` says.
-const MISNAMED_CENTS: f64 = 300.0;
+/// A note that is so far off beside the others has another name than its holes, most often one in another octave. A squeak of the highest notes is
+/// nearer (C#7: 378).
+const MISNAMED_CENTS: f64 = 600.0;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -143,11 +144,12 @@ impl TuneCommand {
         for (note, (_, cents)) in
             notes.iter().zip(&as_built).filter_map(|(note, heard)| Some((note, heard.as_ref()?)))
         {
-            if (cents - usual).abs() > MISNAMED_CENTS {
-                let how = if *cents > usual { "above" } else { "below" };
+            let off = cents - usual;
+            if off.abs() > MISNAMED_CENTS {
+                let how = if off > 0.0 { "above" } else { "below" };
                 say!(
-                    "warning: {note} sounds {:.0} cents {how} its name: look at its name and its holes in the chart",
-                    cents.abs()
+                    "warning: beside the other notes, {note} sounds {:.0} cents {how} its name: look at its name and its holes in the chart",
+                    off.abs()
                 );
             }
         }

@@ -230,11 +230,12 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec
     let is_held = knob.is_armed || knob.is_arming || is_wanted;
     let has_line = ui.available_height() > 160.0;
     let height = (ui.available_height() - if has_line { 118.0 } else { 66.0 }).clamp(42.0, 84.0);
-    let line = match (knob.is_armed, is_wanted || knob.is_arming, knob.is_live) {
+    let line = match (knob.is_armed, knob.is_arming, is_wanted) {
         (true, _, _) => "armed",
-        (false, true, true) => "may turn a little",
-        (false, _, true) => "allows torque",
-        (false, _, false) => "no knob connected",
+        (false, true, _) => "may turn a little",
+        _ if !knob.is_live => "no knob connected",
+        (false, false, true) => "disarmed: press STOP first",
+        (false, false, false) => "allows torque",
     };
     let (fill, ink) = match (is_held, knob.is_live) {
         (false, true) => (c.accent, c.on_accent),

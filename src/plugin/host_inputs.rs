@@ -69,7 +69,7 @@ impl Default for HostInputs {
 }
 
 impl HostInputs {
-    /// Forgets everything.
+    /// Forgets everything but MPE zones and bend ranges, see [`Parts::reset`](chalumeau_core::control::parts::Parts::reset).
     pub fn reset(&mut self) {
         self.translator.reset();
         self.reeds = PartReeds::default();

@@ -28,7 +28,7 @@ pub struct EventTranslator {
 }
 
 impl EventTranslator {
-    /// Forgets everything but the number of parts.
+    /// See [`Parts::reset`].
     pub fn reset(&mut self) {
         self.midi.reset();
     }

@@ -100,6 +100,7 @@ impl UserFolder {
     /// What the user likes; nothing where there is no list.
     fn favourites(&self) -> Result<BTreeSet<String>, String> {
         let path = self.folder.join(FAVOURITES);
+        check_file(&path).map_err(|reason| format!("{}: {reason}", path.display()))?;
         let text = match fs::read_to_string(&path) {
             Err(reason) if reason.kind() == ErrorKind::NotFound => return Ok(BTreeSet::new()),
             read => read.map_err(|reason| format!("{}: cannot be read: {reason}", path.display()))?,
@@ -225,7 +226,9 @@ fn check_file(path: &Path) -> Result<(), String> {
         return Err("is not a file; move it elsewhere".to_owned());
     }
     if file.len() > BYTES_MOST {
-        return Err(format!("has more than {BYTES_MOST} bytes, so it is no preset; move it elsewhere"));
+        return Err(format!(
+            "has more than {BYTES_MOST} bytes, so it is not of Chalumeau; move it elsewhere"
+        ));
     }
     Ok(())
 }
@@ -250,6 +253,27 @@ fn names_of_broken(path: &Path) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn favourites_that_cannot_be_read_are_told_and_not_replaced() {
+        let (_root, folder) = folder();
+        fs::create_dir_all(folder.path()).unwrap();
+        let list = folder.path().join(FAVOURITES);
+        let in_latin_1 = b"Caf\xe9\nMellow\n";
+        fs::write(&list, in_latin_1).unwrap();
+        assert!(folder.set_favourite("Jazz", true).unwrap_err().contains(FAVOURITES));
+        assert_eq!(fs::read(&list).unwrap(), in_latin_1);
+        assert!(folder.read().broken.iter().any(|told| told.contains("cannot be read")));
+        fs::remove_file(&list).unwrap();
+        folder.set_favourite("Jazz", true).unwrap();
+        // What is no file is not read: a pipe would never end.
+        fs::create_dir(folder.path().join("folder.toml")).unwrap();
+        let found = folder.read();
+        assert!(
+            found.favourites.contains("Jazz")
+                && found.broken.iter().any(|told| told.contains("is not a file"))
+        );
+    }
 
     #[test]
     fn a_broken_preset_is_told_by_its_name() {

@@ -31,6 +31,8 @@ const BEGINNING: Duration = Duration::from_secs(2);
 /// Messages between two blocks; more are dropped.
 const QUEUE: usize = 1024;
 
+/// The sustain pedal.
+const SUSTAIN: u8 = 64;
 /// All notes off, on the first channel. The plugin heeds it on any.
 const ALL_NOTES_OFF: [u8; 3] = [0xB0, 123, 0];
 
@@ -38,8 +40,16 @@ const ALL_NOTES_OFF: [u8; 3] = [0xB0, 123, 0];
 /// global.
 static INCOMING: Mutex<Option<Consumer<Sent>>> = Mutex::new(None);
 
-/// The keys of one port that are down, a bit each, on sixteen channels.
-type Held = Arc<Mutex<[u128; 16]>>;
+/// What is down at one port.
+#[derive(Clone, Copy, Default)]
+struct Down {
+    /// The keys of each channel, a bit each.
+    keys: [u128; 16],
+    /// The channels whose sustain pedal is down, a bit each.
+    pedals: u16,
+}
+
+type Held = Arc<Mutex<Down>>;
 
 /// A message of up to three bytes, and how many they are.
 type Sent = ([u8; 3], usize);
@@ -130,11 +140,11 @@ impl State {
         self.open = stay;
         for Keyboard { name, held, .. } in gone {
             say(&format!("MIDI input gone: {name}"));
+            let others: Vec<Held> = self.open.iter().map(|keyboard| keyboard.held.clone()).collect();
             // Whoever played these notes cannot release them any more. Those of other keyboards go on.
-            for (channel, keys) in held.lock().unwrap_or_else(PoisonError::into_inner).iter().enumerate() {
-                for key in (0..128).filter(|key| keys >> key & 1 == 1) {
-                    push(&self.queue, &[0x80 | channel as u8, key as u8, 0]);
-                }
+            let lock = |held: &Held| *held.lock().unwrap_or_else(PoisonError::into_inner);
+            for message in endings(&lock(&held), &others.iter().map(lock).collect::<Vec<_>>()) {
+                push(&self.queue, &message);
             }
             if self.open.is_empty() {
                 push(&self.queue, &ALL_NOTES_OFF);
@@ -205,15 +215,33 @@ fn connected(
     Ok((connection, held))
 }
 
-/// Remembers which keys a message puts down or lets go.
-fn note_keys(held: &mut [u128; 16], bytes: &[u8]) {
-    let &[status, key, velocity] = bytes else { return };
-    let (keys, key) = (&mut held[usize::from(status & 15)], 1 << (key & 127));
+/// Remembers what a message puts down or lets go.
+fn note_keys(down: &mut Down, bytes: &[u8]) {
+    let &[status, first, second] = bytes else { return };
+    let (channel, key) = (usize::from(status & 15), 1 << (first & 127));
     match status & 0xF0 {
-        0x90 if velocity > 0 => *keys |= key,
-        0x80 | 0x90 => *keys &= !key,
+        0x90 if second > 0 => down.keys[channel] |= key,
+        0x80 | 0x90 => down.keys[channel] &= !key,
+        0xB0 if first == SUSTAIN && second >= 64 => down.pedals |= 1 << channel,
+        0xB0 if first == SUSTAIN => down.pedals &= !(1 << channel),
         _ => {}
     }
+}
+
+/// What ends the notes of a port that has gone: its pedals, and the keys that no other port holds.
+fn endings(gone: &Down, others: &[Down]) -> Vec<[u8; 3]> {
+    let mut all = Vec::new();
+    for channel in 0..16_u8 {
+        let at = usize::from(channel);
+        let is_elsewhere = others.iter().any(|other| other.pedals >> channel & 1 == 1);
+        if gone.pedals >> channel & 1 == 1 && !is_elsewhere {
+            all.push([0xB0 | channel, SUSTAIN, 0]);
+        }
+        let elsewhere = others.iter().fold(0, |keys, other| keys | other.keys[at]);
+        let ends = (0..128_u8).filter(|key| (gone.keys[at] & !elsewhere) >> key & 1 == 1);
+        all.extend(ends.map(|key| [0x80 | channel, key, 0]));
+    }
+    all
 }
 
 /// Only threads of MIDI wait here for each other.

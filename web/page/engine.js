@@ -1,6 +1,6 @@
 // Sound: the audio context, the worklet with the module, the microphone.
 
-import { compiled, whySilent } from './sound.js';
+import { compiled, gainOfShare, whySilent } from './sound.js';
 
 /** Rate for what asks before there is sound, or where there is none, Hz. */
 const USUAL_HZ = 48000;
@@ -90,7 +90,7 @@ export class Engine {
 
   /** 0..=1; the ear hears the square. */
   setVolume(share) {
-    this.gain = share * share * 1.25;
+    this.gain = gainOfShare(share);
     this.volume?.gain.setTargetAtTime(this.gain, this.context.currentTime, 0.015);
   }
 

@@ -7,6 +7,8 @@ import { isMain } from './pointers.js';
 const [NARROWEST, NARROWEST_OF_PART] = [26, 37];
 /** Height that a hand moves from pianissimo to fortissimo, pixels. */
 const HEIGHT = 260;
+/** Who has moved the keyboard looks for a note; so long it does not follow what sounds, ms. */
+const LOOKED_MS = 5000;
 /** Breath of a touch before it moves. */
 const TOUCH = 0.62;
 
@@ -40,6 +42,7 @@ export class Keyboard {
   }
 
   shift(octaves) {
+    this.shifted = performance.now();
     this.from = (this.from ?? this.first) + 12 * octaves;
     this.build();
   }
@@ -92,7 +95,8 @@ export class Keyboard {
     this.keys.get(this.sounding)?.classList.remove('down');
     const isNew = note !== this.sounding;
     this.sounding = note;
-    if (isNew && note !== undefined && this.touches.size === 0 && !this.keys.has(note)) {
+    const isLookedFor = performance.now() - (this.shifted ?? -Infinity) < LOOKED_MS;
+    if (isNew && note !== undefined && this.touches.size === 0 && !isLookedFor && !this.keys.has(note)) {
       // What sounds from elsewhere is seen, too.
       this.from = note - 5;
       this.build();

@@ -2,7 +2,7 @@
 
 import { Kept } from './kept.js';
 import { json } from './names.js';
-import { compiled, whySilent } from './sound.js';
+import { compiled, gainOfShare, whySilent } from './sound.js';
 
 /** Time in which a sound that is stopped fades, s. */
 const FADE_S = 0.02;
@@ -91,7 +91,7 @@ function volume() {
 
 /** As the page that plays has it: the ear hears the square. */
 function gainOf(percent) {
-  return (percent / 100) ** 2 * 1.25;
+  return gainOfShare(percent / 100);
 }
 
 get('volume').value = Kept.volume() ?? get('volume').value;
@@ -99,7 +99,12 @@ get('volume').oninput = ({ target }) => {
   loudness?.gain.setTargetAtTime(gainOf(target.value), context.currentTime, 0.015);
   Kept.keepVolume(Number(target.value));
 };
-addEventListener('keydown', ({ key }) => key === 'Escape' && end());
+addEventListener('keydown', ({ key }) => {
+  if (key !== 'Escape') return;
+  clicks += 1;
+  document.querySelectorAll('.making').forEach((card) => card.classList.remove('making'));
+  end();
+});
 
 function end() {
   if (!playing) return;

@@ -44,7 +44,11 @@ export class Midi {
     this.inputs.clear();
     if (!this.access) return;
     this.access.onstatechange = null;
-    for (const input of this.access.inputs.values()) input.onmidimessage = null;
+    for (const input of this.access.inputs.values()) {
+      input.onmidimessage = null;
+      // Other programs may want it.
+      input.close?.();
+    }
     this.access = null;
   }
 

@@ -20,3 +20,8 @@ export async function compiled(address) {
   // A host that calls the file something else than application/wasm must not matter.
   return WebAssembly.compile(await answer.arrayBuffer());
 }
+
+/** The gain of a volume, 0..1: the ear hears the square. */
+export function gainOfShare(share) {
+  return share * share * 1.25;
+}

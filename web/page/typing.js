@@ -67,15 +67,16 @@ export class Typing {
       event.preventDefault();
       this.breath = clamp(this.breath + (event.code === 'ArrowUp' ? STEP : -STEP), 0.06, 1);
       this.on({ breath: this.breath });
-      // As loud as a key that is struck so: down and up again is where it was.
+      // The dynamic of a key that is struck so: down and up again is where it was.
       const [soft, loud] = this.struck();
       if (this.held.size > 0) this.breathe(soft + (loud - soft) * this.breath);
     }
   }
 
   /** Where the browser does not tell the layout, keys tell their letters as they are pressed. */
-  learn({ code, key }) {
-    if (this.layout || key.length !== 1 || this.learnt.get(code) === key || !(CODES.includes(code) || code === 'KeyZ' || code === 'KeyX')) return;
+  learn({ code, key, shiftKey }) {
+    key = key.toLowerCase();
+    if (this.layout || shiftKey || key.length !== 1 || this.learnt.get(code) === key || !(CODES.includes(code) || code === 'KeyZ' || code === 'KeyX')) return;
     this.learnt.set(code, key);
     this.tell();
   }

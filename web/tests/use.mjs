@@ -596,7 +596,7 @@ const HANDS = {
     const seen = nodes.filter((node) => !node.ignored).map(({ role, name }) => [role?.value, name?.value ?? '']);
     const players = seen.filter(([role]) => role === 'application');
     assert.equal(players.length, 1);
-    assert.match(players[0][1], /letters A to semicolon.*arrows.*Escape/);
+    assert.match(players[0][1], /keys from A to '.*arrows.*Escape/);
     assert.ok(!seen.some(([, name]) => name === 'C4' || /^W$/.test(name)), 'drawn keys have no voice');
     assert.ok(!seen.some(([role]) => /^(image|img|canvas)$/i.test(role)), 'nor has the picture');
     await page.focus('#keyboard');

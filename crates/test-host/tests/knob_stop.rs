@@ -35,6 +35,8 @@ const STOPS: [Stop; 7] = [
     Stop::MainThreadHangs,
 ];
 
+/// *Arm knob* is off for so long before it is switched on, s: it works after a second.
+const OFF_S: f64 = 1.4;
 /// Rounds through all of them.
 const ROUNDS: usize = 3;
 
@@ -63,7 +65,7 @@ fn course(plugin: &mut Plugin, mut session: Session, stop: Stop) -> (Session, f6
         plugin,
         &mut session,
         &[At(0, on(E3)), At(0, Say::Set(arm, 0.0)), At(0, Say::Set(panic, 0.0))],
-        0.8,
+        OFF_S,
     );
     let armed = Instant::now();
     attended(plugin, &mut session, &[At(0, Say::Set(arm, 1.0))], 1.5);
@@ -127,7 +129,7 @@ fn late(round: usize) -> Vec<String> {
     let arm = plugin.param("Arm knob").unwrap().id;
     // The hand holds it away from a zero that nobody has set, which the first press tells.
     attended(&mut plugin, &mut session, &[At(0, Say::Set(arm, 1.0))], 0.5);
-    attended(&mut plugin, &mut session, &[At(0, Say::Set(arm, 0.0))], 0.8);
+    attended(&mut plugin, &mut session, &[At(0, Say::Set(arm, 0.0))], OFF_S);
     let mut held_s = Vec::new();
     for stop in STOPS {
         let (next, held) = course(&mut plugin, session, stop);

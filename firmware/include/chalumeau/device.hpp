@@ -254,6 +254,7 @@ class Device {
     // ---- torque
 
     float command(float dt_s) {
+        const bool is_changing = morph_.active();
         const float owed = morph_.tick(dt_s);
         if (session_.phase() == Phase::Disarmed) {
             return 0.0F;
@@ -270,7 +271,7 @@ class Device {
             released(Cause::NotFinite);
             return 0.0F;
         }
-        const float allowed = limits_.clamp(law, owed, dt_s);
+        const float allowed = limits_.clamp(law, owed, is_changing, dt_s);
         if (limits_.limited() && session_.gain() >= 1.0F && clock_us_ - limit_told_us_ > LIMIT_EVENT_US) {
             limit_told_us_ = clock_us_;
             send_event(EventKind::Limit, 0, law + owed);
@@ -281,7 +282,7 @@ class Device {
     /// The sign probe's torque of this tick, mNm, until it has found something.
     float probe(float dt_s) {
         switch (probe_.tick(encoder_, dt_s)) {
-            case Finding::Probing: return limits_.clamp(probe_.torque_mnm(), 0.0F, dt_s);
+            case Finding::Probing: return limits_.clamp(probe_.torque_mnm(), 0.0F, false, dt_s);
             case Finding::Right: session_.probed(); break;
             case Finding::Reversed: fail(Cause::Sign); break;
             case Finding::SpeedReversed: fail(Cause::Speed); break;

@@ -38,10 +38,11 @@ class Limits {
     /// The soft start takes care of the rise.
     void arm(float user_mnm) { user_ = now_ = least(user_mnm, device_); }
 
-    /// The torque allowed, mNm, of a law's torque and of what is owed to the hand. Call once per tick. The law is cut before it is
+    /// The torque allowed, mNm, of a law's torque and of what is owed to the hand where parameters change. Call once per tick. The law is cut before it is
     /// added, too: the hand has never felt more of it than this, so that is all a change of parameters owes.
-    float clamp(float law, float owed, float dt_s) {
-        now_ = least(user_, now_ + SLEW_MNM_PER_S * dt_s);
+    float clamp(float law, float owed, bool is_changing, float dt_s) {
+        // A ceiling rises after a change of parameters is over: both at once would be twice as fast.
+        now_ = least(user_, is_changing ? now_ : now_ + SLEW_MNM_PER_S * dt_s);
         const float wanted = cut(law) + owed;
         const float allowed = cut(wanted);
         limited_ = cut(law) != law || allowed != wanted;

@@ -11,10 +11,9 @@ constexpr float SLEW_MNM_PER_S = 5000.0F;
 /// The torque still owed to the hand.
 class Morph {
   public:
-    /// The law has changed where the hand is: `before` and `after` are the two laws' torques there,
-    /// as the ceiling cuts them. Several changes in a
-    /// row add up, so that what is felt stays continuous; and so do their rates, so that a later change never slows an
-    /// earlier one: each is over after its own `morph_ms`, but where the slew rate forbids.
+    /// The law has changed where the hand is: `before` and `after` are the two laws' torques there, as the ceiling cuts them.
+    /// Several changes in a row add up, so that what is felt stays continuous; and so do their rates, so that a later change never
+    /// slows an earlier one: each is over after its own `morph_ms`, but where the slew rate forbids.
     void begin(float before, float after, std::uint16_t morph_ms) {
         const float change = before - after;
         const float size = change < 0.0F ? -change : change;

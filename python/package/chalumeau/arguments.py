@@ -58,7 +58,7 @@ def instrument(what: InstrumentLike) -> Instrument:
     if isinstance(what, str):
         if "\n" in what:
             return Instrument.parse(what)
-        if not what.lower().endswith(".toml") and not Path(what).is_file():
+        if what in Instrument.ids() or not what.lower().endswith(".toml") and not Path(what).is_file():
             return Instrument.bundled(what)
     if isinstance(what, (str, os.PathLike)):
         try:
@@ -196,7 +196,7 @@ def note(what: NoteLike) -> int:
     if isinstance(what, str):
         what = _spelt(what)
     if isinstance(what, float):
-        raise ValueError(f"a note is a MIDI number or a name such as 'C4'; {what} is not a whole number")
+        raise TypeError(f"a note is a MIDI number or a name such as 'C4'; {what} is not a whole number")
     if isinstance(what, bool) or not (isinstance(what, str) or hasattr(what, "__index__")):
         raise TypeError(f"a note is a MIDI number or a name such as 'C4', not {type(what).__name__}")
     return _native.note(what if isinstance(what, str) else str(operator.index(cast(SupportsIndex, what))))

@@ -13,8 +13,10 @@ use crate::plugin::params::moment::{Moment, Moments};
 use chalumeau_knob::device::{KnobLink, LinkStatus, Phase};
 
 /// How long *Arm* must have been off beside a live knob before switching it on arms. A project or a host that sets
-/// switches while it loads is not an act of the user, and a second press at once after a stop wants no torque.
-const ARM_AFTER: Duration = Duration::from_secs(1);
+/// switches while it loads is not an act of the user.
+const ARM_AFTER: Duration = Duration::from_millis(500);
+/// The same after the knob was disarmed, or a press was refused: a second press at once wants no torque.
+const ARM_AFTER_STOP: Duration = Duration::from_secs(1);
 /// How long a knob may take to arm. The link repeats the message for 0.2 s (`device/session/arming.rs`).
 const ARM_WITHIN: Duration = Duration::from_secs(2);
 
@@ -22,8 +24,10 @@ const ARM_WITHIN: Duration = Duration::from_secs(2);
 #[derive(Default)]
 pub struct KnobSwitches {
     before: Positions,
-    /// Since when *Arm* has been off beside a live knob.
-    off_since: Option<Instant>,
+    /// From when on *Arm*, which is off beside a live knob, arms it.
+    due: Option<Instant>,
+    /// Before this moment it does not.
+    not_before: Option<Instant>,
     /// When the knob was told to arm.
     asked: Option<Instant>,
     was_armed: bool,
@@ -86,7 +90,7 @@ impl KnobSwitches {
             link.feel_osc((port > 0).then(|| SocketAddr::from((Ipv4Addr::LOCALHOST, port))));
         }
         if self.was_armed && !status.armed {
-            self.off_since = None;
+            self.wait_after_stop();
             if now.arm {
                 self.set_hint("disarmed: switch Arm on again".to_owned());
             }
@@ -114,7 +118,13 @@ impl KnobSwitches {
 
     /// Whether *Arm* has been off for long enough.
     fn is_due(&self) -> bool {
-        self.off_since.is_some_and(|since| since.elapsed() >= ARM_AFTER)
+        let now = Instant::now();
+        self.due.is_some_and(|due| now >= due) && self.not_before.is_none_or(|moment| now >= moment)
+    }
+
+    /// The knob was disarmed, or a press was refused.
+    fn wait_after_stop(&mut self) {
+        self.not_before = Some(Instant::now() + ARM_AFTER_STOP);
     }
 
     fn apply_arm(
@@ -135,15 +145,17 @@ impl KnobSwitches {
             self.set_hint("the knob did not arm: switch Arm on again".to_owned());
         }
         if !is_live(status) {
-            self.off_since = None;
+            self.due = None;
         } else if !now.arm {
-            self.off_since.get_or_insert_with(Instant::now);
+            self.due.get_or_insert_with(|| Instant::now() + ARM_AFTER);
         }
         if is_pressed && before.arm {
             // Off and on again since the last look.
             link.disarm();
+            self.asked = None;
+            self.wait_after_stop();
         } else if is_pressed && now.arm && self.is_due() {
-            self.off_since = None;
+            self.due = None;
             if calibrator.is_busy() {
                 self.set_hint("not armed: wait until the knob is calibrated, then switch Arm on".to_owned());
             } else if let Some(stray_deg) = status.stray_deg.filter(|_| !self.is_warned) {
@@ -158,10 +170,12 @@ impl KnobSwitches {
                 self.hint = None;
             }
         } else if is_pressed {
-            self.off_since = None;
+            self.wait_after_stop();
             self.set_hint("not armed: wait a second, then switch Arm on".to_owned());
         } else if !now.arm && before.arm {
             link.disarm();
+            self.asked = None;
+            self.wait_after_stop();
             if status.armed {
                 self.hint = None;
             }
@@ -185,7 +199,7 @@ mod tests {
     use chalumeau_knob::device::memory::{MemoryPort, pair};
     use chalumeau_knob::device::transport::{Binding, Transport};
     use std::sync::Arc;
-    use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+    use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
     use std::thread;
 
     /// The firmware at the other end of a link, in real time, and a shaft that nothing but the test turns.
@@ -221,7 +235,9 @@ mod tests {
             let (ours, theirs) = pair(Binding::Serial, "a wire");
             let (counts, stop) = (Arc::new(AtomicI64::new(0)), Arc::new(AtomicBool::new(false)));
             let (turned, stopped) = (counts.clone(), stop.clone());
-            let setup = Setup::default();
+            // Each desk has a knob of its own: only one host may have one.
+            static DESKS: AtomicU64 = AtomicU64::new(0x00DE_5C00);
+            let setup = Setup { serial: DESKS.fetch_add(1, Ordering::Relaxed), ..Setup::default() };
             let knob = thread::spawn(move || live(theirs, &setup, &turned, &stopped));
             link.attach(Box::new(ours));
             let mut desk = Self {
@@ -262,11 +278,15 @@ mod tests {
             unsafe { param._internal_set_plain_value(value) };
         }
 
-        #[allow(unsafe_code)]
         fn press_arm(&self) {
+            self.switch_arm(true);
+        }
+
+        #[allow(unsafe_code)]
+        fn switch_arm(&self, on: bool) {
             // SAFETY: as above.
             unsafe {
-                nice_plug::params::InternalParamMut::_internal_set_plain_value(&self.params.knob.arm, true)
+                nice_plug::params::InternalParamMut::_internal_set_plain_value(&self.params.knob.arm, on)
             };
         }
 
@@ -297,6 +317,36 @@ mod tests {
         desk.cycle();
         heart.beat();
         desk.until("the lower ceiling", |desk| desk.link.status().ceiling_mnm == 60);
+    }
+
+    #[test]
+    fn a_second_press_at_once_after_a_stop_arms_nothing() {
+        let mut desk = Desk::new();
+        let heart = desk.link.heartbeat("the test");
+        heart.beat();
+        // The switch learns that it may be on.
+        desk.cycle();
+        desk.switch_arm(true);
+        desk.cycle();
+        assert!(desk.switches.asked.is_some(), "{}", desk.hint());
+        desk.switch_arm(false);
+        desk.cycle();
+        let stopped = Instant::now();
+        // The guard against loading is over, that after a stop is not.
+        while stopped.elapsed() < ARM_AFTER + Duration::from_millis(50) {
+            desk.cycle();
+            thread::sleep(Duration::from_millis(2));
+        }
+        desk.switch_arm(true);
+        desk.cycle();
+        if stopped.elapsed() < ARM_AFTER_STOP {
+            assert!(desk.hint().contains("wait a second"), "{}", desk.hint());
+            assert!(desk.switches.asked.is_none());
+        }
+        // That press counts as another.
+        let refused = Instant::now();
+        desk.until("due", |desk| desk.switches.is_due());
+        assert!(refused.elapsed() > Duration::from_millis(900), "{:?}", refused.elapsed());
     }
 
     #[test]

@@ -85,7 +85,7 @@ fn resonance(bore: &TransferMatrix, open: &[bool], reed_volume_m3: f64, note_hz:
 impl ContextFingerings {
     /// Compares the alternates of an instrument, whose A4 is `a4_hz`, with its chart: milliseconds. Allocates.
     pub fn new(file: &InstrumentFile, air: &Air, a4_hz: f64) -> Self {
-        let mechanism = Mechanism::boehm();
+        let mechanism = Mechanism::of(file);
         let notes = file.fingerings.len();
         let bore = TransferMatrix::new(file, *air);
         let alternates: Vec<Alternate> = fingering_choices(file)

@@ -59,7 +59,8 @@ impl Default for Bends {
 }
 
 impl Bends {
-    /// All wheels at rest, before any note. Zones and ranges stay: a controller tells them once, when it is switched on.
+    /// All wheels at rest, before any note, and the usual range. Zones and the ranges that were told stay: a controller tells them once, when it is
+    /// switched on.
     #[must_use]
     pub fn at_rest(mut self) -> Self {
         for wheel in &mut self.wheels {

@@ -119,7 +119,7 @@ impl Parts {
         self.decoders.len()
     }
 
-    /// Forgets everything but the number of parts, the place of the key switches, and which keys play.
+    /// Forgets everything but the number of parts, the place of the key switches, which keys play, and what [`MidiDecoder::reset`] keeps.
     pub fn reset(&mut self) {
         self.begin();
         self.switches.release_all();

@@ -18,6 +18,8 @@ use crate::reed::physical::{P_REF_PA, PhysicalReed, ZETA_REFERENCE};
 use crate::reed::strength;
 use crate::units::clamped_or;
 
+/// Stiffnesses of coupled reeds, of H 5 and of H 1, with room for rounding.
+const K_RANGE: (f32, f32) = (0.05, 7.0);
 /// Softest and loudest breath are at least this far apart.
 const LEAST_BREATH_RANGE: f32 = 0.05;
 
@@ -106,7 +108,8 @@ pub struct Settings {
     pub lay: f32,
     /// H of the reference notebook, the dimensionless rest opening, 1..=5. Default sqrt(27)/2.
     pub reed_h: f32,
-    /// k of the reference notebook, the dimensionless stiffness, 0.1..=2. Default 27/(4 H^3). Ignored while `coupled`.
+    /// k of the reference notebook, the dimensionless stiffness, 0.1..=2 as a parameter; up to those of a coupled reed, 0.05..=7, as it
+    /// is played. Default 27/(4 H^3). Ignored while `coupled`.
     pub reed_k: f32,
     /// Coupling of the reference notebook: k = 27/(4 H^3), so that the peak flow stays 1. Default true.
     pub coupled: bool,
@@ -204,11 +207,16 @@ impl Settings {
         chosen.unwrap_or(by_setting)
     }
 
+    /// k as it is set, or as H has it.
+    fn own_k(&self) -> f64 {
+        if self.coupled { coupled_k(f64::from(self.reed_h)) } else { f64::from(self.reed_k) }
+    }
+
     /// The law of the reed under these settings: strength sets the stiffness, the lip the opening. Real-time safe.
     pub fn reed_law(&self) -> ReedLaw {
         let settings = self.clamped();
         let set_h = f64::from(settings.reed_h);
-        let set_k = if settings.coupled { coupled_k(set_h) } else { f64::from(settings.reed_k) };
+        let set_k = settings.own_k();
         let stiffer = strength::stiffness(f64::from(settings.strength));
         let h = (set_h * f64::from(settings.lip)).clamp(0.5, 10.0);
         let k = (set_k * stiffer).clamp(0.01, 20.0);
@@ -288,18 +296,17 @@ impl Settings {
         if [h, k] == [1.0, 1.0] {
             return self;
         }
-        let own_k = if self.coupled { coupled_k(f64::from(self.reed_h)) as f32 } else { self.reed_k };
-        Self { reed_h: self.reed_h * h, reed_k: own_k * k, coupled: false, ..self }.clamped()
+        let reed_k = self.own_k() as f32 * k;
+        Self { reed_h: self.reed_h * h, reed_k, coupled: false, ..self }.clamped()
     }
 
     /// These settings with the reed as a player's lip shapes it: what meters and drawings of the played reed need. Real-time
     /// safe.
     pub fn under_lip(self, lip: Option<LipShape>) -> Self {
         let Some(lip) = lip else { return self };
-        let k = if self.coupled { coupled_k(f64::from(self.reed_h)) as f32 } else { self.reed_k };
         Self {
             reed_h: self.reed_h * lip.opening as f32,
-            reed_k: k,
+            reed_k: self.own_k() as f32,
             coupled: false,
             zeta: self.zeta * lip.channel as f32,
             lay: self.lay * lip.knee as f32,
@@ -375,7 +382,7 @@ impl Settings {
             damping: clamped_or(self.damping, 0.2, 2.0, d.damping),
             lay: clamped_or(self.lay, 0.0, 0.5, d.lay),
             reed_h: clamped_or(self.reed_h, 1.0, 5.0, d.reed_h),
-            reed_k: clamped_or(self.reed_k, 0.1, 2.0, d.reed_k),
+            reed_k: clamped_or(self.reed_k, K_RANGE.0, K_RANGE.1, d.reed_k),
             coupled: self.coupled,
             reed_a: clamped_or(self.reed_a, 0.0, 2.0, d.reed_a),
             a4_hz: clamped_or(self.a4_hz, A4_RANGE_HZ.0 as f32, A4_RANGE_HZ.1 as f32, d.a4_hz),

@@ -541,7 +541,7 @@ impl HostSession {
         // Without a STATE there is nothing that a permission could answer.
         let stamp = self.state().map(|state| Stamp { epoch: state.epoch.unwrap_or(0), heard_us: state.t_us });
         let arm = Arm { session: self.number, ceiling_mnm: self.arming.ceiling_mnm(), stamp };
-        // Torque that nobody wants has no ceiling to play with, should FREE be lost.
+        // While nobody wants torque, ALIVE has a ceiling of 0, in case FREE is lost.
         let ceiling_mnm = if self.arming.is_wanted() { arm.ceiling_mnm } else { 0 };
         let alive = Arm { ceiling_mnm, ..arm };
         let waits = self.arming.is_wanted() && (self.zeroing.is_pending() || !self.is_dated);

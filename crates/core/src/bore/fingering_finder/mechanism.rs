@@ -10,6 +10,9 @@ use crate::bore::instrument_file::{HoleKind, InstrumentFile};
 /// Fingers that a mechanism can have: those of a Boehm clarinet, and of holes that it does not have.
 pub const MAX_FINGERS: usize = 18;
 
+/// Most combinations of positions that are looked through with fingers beyond those of a Boehm clarinet, which has 144000: some seconds.
+const MOST_POSITIONS: usize = 600_000;
+
 /// One combination of open holes, and how it is reached with the least effort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grip {
@@ -69,14 +72,17 @@ impl Mechanism {
     }
 
     /// That of a clarinet with the Boehm system, with a further finger for each finger hole of this instrument that such a clarinet does not have, as
-    /// far as there are. Allocates.
+    /// long as there are no more than [`MOST_POSITIONS`] to look through. Allocates.
     pub fn of(file: &InstrumentFile) -> Self {
         let mut all = BOEHM.clone();
+        let is_here = |finger: &Vec<Held>| finger.iter().filter(|held| held.is_here).count();
+        let mut positions: usize = BOEHM.on(file).fingers.iter().map(is_here).product();
         for name in BOEHM.unmoved(file) {
             let is_finger = file.hole(&name).is_some_and(|hole| file.holes[hole].kind == HoleKind::Finger);
-            if !is_finger || all.finger.len() == MAX_FINGERS {
+            if !is_finger || all.finger.len() == MAX_FINGERS || 2 * positions > MOST_POSITIONS {
                 continue;
             }
+            positions *= 2;
             let open =
                 Position { presses: String::new(), closes: String::new(), opens: String::new(), effort: 0 };
             let covered = Position { presses: name.clone(), closes: name.clone(), ..open.clone() };

@@ -180,6 +180,10 @@ impl BreathChoice {
         self.messages += 1;
         let is_snapshot = matches!(place, Place::Recognised | Place::Within);
         let claim = &mut self.claims[channel][controller as usize];
+        if claim.fader.coarse.is_none() && matches!(part, Part::Fine(_)) {
+            // Without its coarse part it says nothing, now or later.
+            return None;
+        }
         if is_snapshot && matches!(part, Part::Fine(_)) && self.heard != Some(controller) {
             // It does not show that the device has a fine part.
             return None;

@@ -358,8 +358,13 @@ fn a_fine_part_without_its_coarse_part_is_no_breath() {
         assert_eq!(midi.note_on(0, 60, 127), [on(60)], "velocity blows");
         assert_eq!(midi.controller(0, cc, 127), NOTHING);
         assert_eq!(midi.controller(0, cc, 0), NOTHING);
-        // With its coarse part it is fine again.
-        assert_eq!(midi.controller(0, cc - 32, 64), [Event::Breath(64.0 * 128.0 / 16383.0)]);
+        // Nor does it make something of a value at rest.
+        let mut other = MidiDecoder::new();
+        other.controller(0, cc, 100);
+        other.controller(0, cc - 32, if cc == 34 { 0 } else { 127 });
+        assert_eq!(other.note_on(0, 60, 127), [on(60)]);
+        // What moves with its coarse part is breath.
+        assert_eq!(midi.controller(0, cc - 32, 64), [Event::Breath(64.0 / 127.0)]);
     }
 }
 

@@ -9,7 +9,7 @@ use crate::device::feel_osc::FeelSender;
 use crate::device::heartbeat::{OBEDIENCE_US, Pulse};
 use crate::device::session::arming::{HARD_CEILING_MNM, OFFERED_CEILING_MNM};
 use crate::wire::Feel;
-use chalumeau_core::haptics::feel_parameters::TorqueLaw;
+use chalumeau_core::haptics::torque_law;
 
 /// What people must know while torque goes this way.
 const WARNING: &str = "the torque goes through the bridge: if this program ends, the bridge takes it away after 3 s; if the \
@@ -108,10 +108,8 @@ impl BridgedFeel {
 
 /// Largest torque of a law, over its scale; 1 or more. Firmware that does not know H and k has 1.
 fn peak(feel: &Feel) -> f32 {
-    match feel.law {
-        TorqueLaw::Flow => (4.0 * feel.h.powi(3) * feel.k / 27.0).sqrt().max(1.0),
-        TorqueLaw::Free | TorqueLaw::Pressure => 1.0,
-    }
+    let law = Feel { scale_mnm: 1.0, detent: 0, ..*feel };
+    torque_law::extremes(&law).torque_mnm.max(1.0) as f32
 }
 
 /// Why there must be no torque.
@@ -131,6 +129,7 @@ fn reason(pulse: &Pulse, is_heard: bool, now_us: i64) -> Option<String> {
 mod tests {
     use super::*;
     use crate::device::heartbeat::Release;
+    use chalumeau_core::haptics::feel_parameters::TorqueLaw;
     use rosc::OscPacket;
     use std::net::UdpSocket;
     use std::time::Duration;
@@ -191,6 +190,27 @@ mod tests {
         assert_eq!(heard.len(), 1);
         assert!(heard[0].0 == 57.0 && heard[0].1 > 0.0, "the ceiling holds: {heard:?}");
         (bridge, feels)
+    }
+
+    #[test]
+    fn a_flow_law_that_exceeds_its_scale_stays_under_the_ceiling() {
+        let (bridge, mut feels) = armed();
+        let bare = Feel { damping_mnms: 0.0, wall_mnm_per_deg: 0.0, slap_mnm_per_deg: 0.0, ..feel() };
+        let wide = Feel { law: TorqueLaw::Flow, h: 4.2, k: 0.3849, ..bare };
+        feels.poll(Some(&wide), None, 1_000_000);
+        let heard = bridge.heard();
+        let most = torque_law::extremes(&Feel { scale_mnm: heard[0].0, ..wide }).torque_mnm + 2.0;
+        assert!((59.0..=60.0).contains(&most), "{heard:?}: {most}");
+    }
+
+    #[test]
+    fn a_stop_that_comes_with_another_arm_ends_the_torque() {
+        let (bridge, mut feels) = armed();
+        let stopped = Pulse { released: Some(Release::Stop), ..pulse(1_000_000) };
+        assert!(feels.arm(60, false, &stopped, true, 1_000_000).is_err());
+        assert_eq!(feels.ceiling_mnm(), None);
+        feels.poll(Some(&feel()), None, 1_010_000);
+        assert_eq!(bridge.heard(), [(0.0, 0.0)]);
     }
 
     #[test]

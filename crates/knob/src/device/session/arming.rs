@@ -310,6 +310,22 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_knob_that_still_probes_is_freed_until_it_ends_where_nobody_wants_it_any_more() {
+        let mut arming = Arming::default();
+        arming.arm(100, false, &info(450), 0);
+        assert_eq!(said(&mut arming, 0, 10), [ArmingMessage::Arm]);
+        assert_eq!(arming.hear(false, true, Some(5), 10_000), None);
+        arming.disarm(20_000);
+        for ms in [20, 70, 120] {
+            // The FREE before was lost.
+            assert_eq!(arming.hear(false, true, Some(5), 1_000 * ms), None);
+            assert_eq!(said(&mut arming, ms, ms + 50), [ArmingMessage::Free], "{ms}");
+        }
+        assert_eq!(arming.hear(false, false, Some(6), 170_000), None);
+        assert_eq!(said(&mut arming, 170, 400), []);
+    }
+
+    #[test]
     fn a_disarming_between_two_tries_ends_the_act() {
         let mut arming = Arming::default();
         arming.arm(100, false, &info(450), 0);
