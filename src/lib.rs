@@ -9,7 +9,7 @@
 //! - `standalone` uses the plugin, and runs it without a host. The plugin does not use the standalone.
 //! - `tour` is what the listening pages of the command line and of the browser play.
 //! - `cache`, `controllers`, `feel_flags`, `folder_listing`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
-//!   `identity` has the names that hosts know the plugin by. They use none of the four.
+//!   `stderr` writes their messages, and `identity` has the names that hosts know the plugin by. They use none of the four.
 
 #[macro_use]
 mod stderr;

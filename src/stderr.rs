@@ -4,6 +4,7 @@ use std::fmt;
 use std::io::{self, Write};
 
 /// As `eprintln!`, but where the reader has gone (`2>&1 | head`), nothing is said instead of a panic.
+#[cfg(feature = "plugin")]
 macro_rules! tell {
     ($($text:tt)*) => { $crate::stderr::line(format_args!($($text)*)) };
 }

@@ -132,7 +132,7 @@ impl Instrument {
 }
 
 /// An error about the text that was made of a dict, without its lines, which the user does not see.
-fn of_dict(error: &str) -> String {
+pub fn of_dict(error: &str) -> String {
     let no_line = |text: &str| text.strip_prefix("line ")?.split_once(": ").map(|(_, what)| what.to_owned());
     if !error.contains("TOML parse error at line") {
         return no_line(error).unwrap_or_else(|| error.to_owned());

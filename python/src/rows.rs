@@ -1,5 +1,6 @@
 //! The rows of a plan, as `chalumeau batch` reads it.
 
+use crate::instrument::of_dict;
 use crate::mistakes::wrong;
 use chalumeau::cli::offline::{self, Rows};
 use pyo3::prelude::*;
@@ -19,7 +20,7 @@ pub fn rows(
         (None, None, Some(json)) => serde_json::from_str::<toml::Table>(json)
             .map_err(|error| format!("the dict is not like a plan: {error}"))
             .and_then(|table| toml::to_string(&table).map_err(|error| error.to_string()))
-            .and_then(|text| Rows::parse(&text)),
+            .and_then(|text| Rows::parse(&text).map_err(|error| of_dict(&error))),
         (None, None, None) => Err("a plan is a path, a text or a dict".to_owned()),
     };
     let Rows { names, values } = rows.map_err(wrong)?;

@@ -32,9 +32,8 @@ const MEASURE_S: f64 = 0.6;
 /// through which no air flows (--A 0) moves at most as loud as -71 dBFS.
 const SILENT_DBFS: f64 = -65.0;
 
-/// A note that is so far off beside the others has another name than its holes, most often one in another octave. A squeak of the highest notes is
-/// nearer (C#7: 378).
-const MISNAMED_CENTS: f64 = 600.0;
+/// A note that is so far off beside the others has the name of another octave. A squeak is nearer: that of C#7 lies 734 cents off.
+const MISNAMED_CENTS: f64 = 900.0;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -72,7 +72,7 @@ impl Mechanism {
     }
 
     /// That of a clarinet with the Boehm system, with a further finger for each finger hole of this instrument that such a clarinet does not have, as
-    /// long as there are no more than [`MOST_POSITIONS`] to look through. Allocates.
+    /// long as the search stays within some seconds. Allocates.
     pub fn of(file: &InstrumentFile) -> Self {
         let mut all = BOEHM.clone();
         let is_here = |finger: &Vec<Held>| finger.iter().filter(|held| held.is_here).count();

@@ -1,10 +1,29 @@
 //! Why a text is not an instrument: where, what was given, what would be right.
 
+/// What the reader of TOML says, and what a maker understands.
+const PLAIN_WORDS: [(&str, &str); 11] = [
+    ("expected struct RawSegment", "expected a cone, such as { x_start_mm = 0.0, x_end_mm = 40.0, ... }"),
+    ("expected struct RawHole", "expected a hole with its own [[hole]]"),
+    ("expected struct RawFingering", "expected a fingering with its own [[fingering]]"),
+    ("expected i64", "expected a whole number"),
+    ("expected i32", "expected a whole number"),
+    ("expected u32", "expected a whole number, 0 or more"),
+    ("expected f64", "expected a number without quotes"),
+    ("expected a string", "expected one text in quotes"),
+    ("invalid type: sequence", "this is a list"),
+    ("invalid type: ", "this is a value of another kind: "),
+    ("unknown variant", "unknown word"),
+];
+
+fn in_plain_words(error: &toml::de::Error) -> String {
+    PLAIN_WORDS.iter().fold(error.to_string(), |text, (theirs, ours)| text.replace(theirs, ours))
+}
+
 /// Why a text is not an instrument. Numbers are given as in the file, in its own unit.
 #[derive(Debug, thiserror::Error)]
 pub enum InstrumentError {
     /// Not TOML, a missing or unknown key, or a value of the wrong kind; line and column are in the message.
-    #[error("not an instrument file: {0}")]
+    #[error("not an instrument file: {}", in_plain_words(.0))]
     Syntax(#[from] toml::de::Error),
     /// A number out of range, a hole off the bore or wider than it.
     #[error("{place}: {field} is {given}; it must be {expected}")]
