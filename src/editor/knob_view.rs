@@ -233,6 +233,8 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec
     let line = match (knob.is_armed, knob.is_arming, is_wanted) {
         (true, _, _) => "armed",
         (false, true, _) => "may turn a little",
+        // Stock firmware sends its angle, and gets a feel from a bridge alone.
+        _ if !knob.is_live && knob.angle_deg.is_some() => "needs a bridge",
         _ if !knob.is_live => "no knob connected",
         (false, false, true) => "disarmed: press STOP first",
         (false, false, false) => "allows torque",
