@@ -802,6 +802,27 @@ fn a_zero_that_the_line_loses_is_said_again_and_arm_waits_for_it() {
     assert!(bench.session.is_armed(), "the user has another go: {:?}", bench.session.refusal());
 }
 
+#[test]
+fn alive_allows_no_torque_while_nobody_wants_any() {
+    let mut bench = Bench::new(Binding::Serial);
+    let allowing =
+        |bench: &Bench| bench.count(|m| matches!(m, Message::Alive(alive) if alive.ceiling_mnm > 0));
+    bench.run(500);
+    assert!(bench.count(|m| matches!(m, Message::Alive(_))) > 10 && allowing(&bench) == 0);
+    bench.session.arm(100, false, bench.now_us);
+    bench.run(500);
+    assert!(bench.session.is_armed() && allowing(&bench) > 10);
+    bench.session.disarm(bench.now_us);
+    let before = allowing(&bench);
+    bench.run(500);
+    assert_eq!(allowing(&bench), before);
+    // Another act allows as much as it says.
+    bench.session.arm(60, false, bench.now_us);
+    bench.run(500);
+    assert!(bench.session.is_armed() && bench.session.ceiling_mnm() == 60);
+    assert!(bench.count(|m| matches!(m, Message::Alive(alive) if alive.ceiling_mnm == 60)) > 10);
+}
+
 /// 300 lives of a knob with a bad line, a host that stalls and a supply that fails: once disarmed, always disarmed.
 #[test]
 fn no_fault_ever_arms_a_knob() {
