@@ -74,9 +74,8 @@ fn frames_within(py: Python<'_>) -> PyResult<usize> {
     let mut count = 0;
     while !frame.is_none() {
         // Code of `exec` may have no name; then it is the user's.
-        let module =
-            frame.getattr("f_globals")?.call_method1("get", ("__name__", ""))?.extract().unwrap_or_default();
-        let module: String = module;
+        let name = frame.getattr("f_globals")?.call_method1("get", ("__name__", ""))?;
+        let module = name.extract::<String>().unwrap_or_default();
         if module != "chalumeau" && !module.starts_with("chalumeau.") {
             break;
         }

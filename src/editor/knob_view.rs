@@ -234,7 +234,7 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec
         (true, _, _) => "armed",
         (false, true, _) => "may turn a little",
         // Stock firmware sends its angle, and gets a feel from a bridge alone.
-        _ if !knob.is_live && knob.angle_deg.is_some() => "needs a bridge",
+        _ if !knob.is_live && knob.angle_deg.is_some() => "only with a bridge",
         _ if !knob.is_live => "no knob connected",
         (false, false, true) => "disarmed: press STOP first",
         (false, false, false) => "allows torque",

@@ -21,8 +21,7 @@ use chalumeau_knob::touch::take::TakeRow;
 /// Who carries out the switches, in "... has stood still".
 const SWITCHES: &str = "the plugin's thread for the knob's switches";
 
-/// How the text begins that counts the rows of a take, and how often it is told.
-const RECORDING: &str = "recording";
+/// How often the rows of a take are counted for the user.
 const COUNT_EVERY: Duration = Duration::from_secs(1);
 
 /// The state of the controller's thread.
@@ -247,18 +246,17 @@ impl KnobController {
     fn report(&mut self, status: Option<&LinkStatus>) {
         let mut words = vec![status.map_or_else(|| "off".to_owned(), |status| status.text.clone())];
         let work = self.shared.work_texts();
-        if let Some(rows) = work.rows {
-            words.push(format!("{RECORDING}, {rows} rows"));
-        }
         let hint = self.switches.hint().cloned();
         words.extend([hint, work.refused, work.short_breath, work.take].into_iter().flatten());
         if let Some(status) = status {
             let texts = [&status.alarm, &status.restriction, &status.last_refusal, &status.notice];
             words.extend(texts.into_iter().flatten().cloned());
         }
+        let news = words.join("; ");
         // Rows come a hundred times a second: they are told once a second, and are nothing for a log.
-        let news =
-            words.iter().filter(|word| !word.starts_with(RECORDING)).cloned().collect::<Vec<_>>().join("; ");
+        if let Some(rows) = work.rows {
+            words.insert(1, format!("recording, {rows} rows"));
+        }
         let is_new = self.logged != news;
         if !is_new && self.counted.is_some_and(|at| at.elapsed() < COUNT_EVERY) {
             return;

@@ -59,6 +59,8 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
         "--wait-armed",
         "--log",
         &text(&log),
+        // Of the demonstration before.
+        "--force",
         "--seconds",
         &seconds,
     ])?;
