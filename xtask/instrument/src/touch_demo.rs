@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use chalumeau_core::control::keys::Keys;
 use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, TorqueLimits};
@@ -22,6 +22,11 @@ const BLOCK: usize = 128;
 const PHYSICAL: f64 = 1.0;
 /// The hand begins so long before the notes, s: time for the firmware's torque to come up.
 const LEAD_S: f64 = 1.0;
+/// How long the hand may take to move, s: the knob has to be armed first.
+const PATIENCE_S: f64 = 10.0;
+/// The hand's sign that the knob is armed: it turns so far, and back, each in this time. It makes no sound.
+const SIGN_DEG: f64 = 20.0;
+const SIGN_S: f64 = 0.1;
 /// The hand is ahead of the fingers by what it needs to get there and what the link needs to tell, s.
 const AHEAD_S: f64 = 0.06;
 /// Step of the hand's script, s.
@@ -46,7 +51,8 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
     let feels = InstrumentFeel::built_in().map_err(|reason| anyhow!("{reason}"))?;
     let table = feels.table(&Settings::physical(), &FeelDesign::default(), &TorqueLimits::default())?;
     let hand = folder.join("hand.csv");
-    std::fs::write(&hand, script(score, &feels, &table, rate))?;
+    let angles = angles(score, &feels, &table, rate);
+    std::fs::write(&hand, script(&angles))?;
     let log = folder.join("knob.csv");
     let number = serial_number();
     let text = |path: &Path| path.to_string_lossy().into_owned();
@@ -76,15 +82,15 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
     let status = plugin.param("Knob status")?.id;
     let played = plugin.session(rate_hz, BLOCK, |session| -> Result<_> {
         wait_until_live(session, rate_hz)?;
-        let armed_at = session.played();
-        let lead = (LEAD_S * rate_hz) as usize;
-        let mut all = vec![At(0, Say::Set(arm, 1.0))];
+        // The fingers follow the hand: arming takes the knob its own time.
+        let sign = wait_for_sign(session, Say::Set(arm, 1.0), rate_hz)?;
+        let lead = (sign + (LEAD_S * rate_hz) as usize).saturating_sub(session.played());
         // The notes alone: breath is the knob's.
         let notes =
             said.iter().filter(|At(_, say)| !matches!(say, Say::Midi([status, ..]) if status & 0xF0 == 0xB0));
-        all.extend(notes.map(|At(at, say)| At(at + lead, *say)));
-        let [left, _] = session.play_live(&all, lead + score.samples, rate_hz)?;
-        let first = armed_at + lead;
+        let notes: Vec<At> = notes.map(|At(at, say)| At(at + lead, *say)).collect();
+        let first = session.played() + lead;
+        let [left, _] = session.play_live(&notes, lead + score.samples, rate_hz)?;
         let breath = breath_sent(session, first, rate_hz);
         Ok((left[lead..].to_vec(), breath))
     })?;
@@ -102,6 +108,21 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
         gamma: breath.into_iter().map(|[t, unit]| [t, unit * full]).collect(),
         threshold: threshold(score, &feels, &table, rate),
     })
+}
+
+/// Arms the knob and waits for the sign of its hand: the sample at which it begins.
+fn wait_for_sign(session: &mut Session, arm: Say, rate_hz: f64) -> Result<usize> {
+    let armed_at = session.played();
+    let mut said = vec![At(0, arm)];
+    while (session.played() - armed_at) as f64 <= PATIENCE_S * rate_hz {
+        session.play_live(&said, (STEP_S * rate_hz) as usize, rate_hz)?;
+        said.clear();
+        let breath = breath_sent(session, armed_at, rate_hz);
+        if let Some([t_s, _]) = breath.into_iter().find(|[t_s, unit]| *t_s > 0.0 && *unit > 0.0) {
+            return Ok(armed_at + (t_s * rate_hz) as usize);
+        }
+    }
+    bail!("the simulated knob was not armed within {PATIENCE_S:.0} s: its hand does not move")
 }
 
 /// Breath as the host could have recorded it: seconds from sample `first`, 0..=1 of full breath.
@@ -124,8 +145,9 @@ fn breath_sent(session: &Session, first: usize, rate_hz: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// What the hand does: for each moment the angle that blows what the score asks of the note in the fingers.
-fn script(score: &Score, feels: &InstrumentFeel, table: &FeelTable, rate: u32) -> String {
+/// What the hand does: for each step from the score's start the angle that blows what the score asks of the note in the
+/// fingers, degrees.
+fn angles(score: &Score, feels: &InstrumentFeel, table: &FeelTable, rate: u32) -> Vec<f64> {
     let full_pa = 1e3 * f64::from(Settings::physical().breath_full_kpa);
     let maps = feels.maps(table);
     let mut angles = Vec::new();
@@ -157,7 +179,12 @@ fn script(score: &Score, feels: &InstrumentFeel, table: &FeelTable, rate: u32) -
     for at in (1..angles.len()).rev() {
         angles[at - 1] = f64::clamp(angles[at - 1], angles[at] - HASTE_DEG, angles[at] + HASTE_DEG);
     }
-    let mut text = "t_s,angle_deg\n0,0\n".to_owned();
+    angles
+}
+
+/// The hand's angles as a script for the simulator, which plays it once the knob is armed.
+fn script(angles: &[f64]) -> String {
+    let mut text = format!("t_s,angle_deg\n0,0\n{SIGN_S},{SIGN_DEG}\n{},0\n", 2.0 * SIGN_S);
     for (at, angle) in angles.iter().enumerate() {
         let _ = writeln!(text, "{:.3},{angle:.2}", at as f64 * STEP_S + LEAD_S - AHEAD_S);
     }
