@@ -86,13 +86,13 @@ Examples:
   chalumeau measure recording.wav --plot recording.png
   chalumeau haptic --all --contrast 1
 
-Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads *written* notes, which \
-sound two semitones lower. Mouth pressure is given as gamma: the pressure in the mouth over the pressure that shuts \
-the reed. Notes begin between 0.30 and 0.41; between 0.5 and 0.7 the reed begins to beat against the lay; at 1 a \
-resting reed with a sharp facing (--lay 0) would be shut, on a curved one somewhat later; well above, the note \
-chokes. Or it is given as a dynamic: --dynamic pp to ff, as a player plays.";
+Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads written notes, which \
+sound two semitones lower. Gamma is the mouth pressure over the pressure that closes the reed. Notes begin at a gamma \
+of 0.30 to 0.41. From 0.5 to 0.7 on, the reed beats against the facing. At 1, a reed that does not vibrate would be \
+closed on a straight facing (--lay 0), on a curved facing somewhat later. Far above 1, there is no sound. Instead of \
+gamma, --dynamic pp to ff sets the loudness as a player does.";
 
-/// A clarinet you play by touch: reed, bore with real tone holes, sound.
+/// Plays, measures and draws a clarinet whose sound is computed from physics.
 #[derive(Parser)]
 #[command(name = "chalumeau", version, after_help = EXAMPLES, max_term_width = 100)]
 struct Cli {

@@ -200,7 +200,7 @@ impl Tab {
             Self::Play => "The clarinet as it is played, and the main controls",
             Self::Reed => "Reed: flow over pressure, and the torque you feel",
             Self::Clarinet => "Bore, tone holes and keys; try fingerings",
-            Self::Breath => "Mouth pressure, where it comes from, calibration",
+            Self::Breath => "Breath: its source, its curve, calibration",
             Self::Sound => "Spectrum, waves, pitch",
             Self::Knob => "Knob: device, arming, torque",
             Self::Instrument => "Which clarinet, tuning, articulation, output",

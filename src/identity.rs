@@ -20,7 +20,7 @@ pub const EMAIL: &str = "";
 /// Version shown to hosts.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Description in plugin browsers.
-pub const DESCRIPTION: &str = "A clarinet you play by touch";
+pub const DESCRIPTION: &str = "A clarinet whose sound is computed from physics";
 /// CLAP plugin id.
 pub const CLAP_ID: &str = "chalumeau.clarinet";
 /// VST3 class id.

@@ -139,7 +139,7 @@ pub enum Sets {
     /// A number of the reed as its maker measures it, and how many of the parameter's units make one SI unit.
     Reed(fn(&mut PhysicalReed) -> &mut f64, f64),
     /// Whether the measured reed is in use: a choice of dimensionless and physical.
-    ReedFace,
+    ReedDescription,
 }
 
 /// A value that a parameter can take.
@@ -153,6 +153,11 @@ pub enum Value {
     Choice(usize),
     /// Of a [`Switch`].
     Switch(bool),
+}
+
+/// A text of the table without the asterisks around names of parameters.
+pub fn plain(text: &str) -> String {
+    text.replace('*', "")
 }
 
 /// The parameter with this id.

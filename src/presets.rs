@@ -120,7 +120,7 @@ impl Preset {
                 (Some(Sets::Reed(field, unit)), Value::Number(number)) => {
                     *field(&mut reed) = f64::from(number) / unit;
                 }
-                (Some(Sets::ReedFace), Value::Choice(face)) => is_measured = face == 1,
+                (Some(Sets::ReedDescription), Value::Choice(description)) => is_measured = description == 1,
                 // What a controller drives follows nothing else.
                 (None, Value::Choice(source)) if parameter.id == "ksrc" => is_driven = source > 0,
                 _ => {}

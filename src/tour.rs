@@ -194,12 +194,12 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
             ],
         ),
         (
-            "A player lives",
+            "A held note",
             vec![
                 held(
                     Settings { life: 0.0, ..base },
                     "Held, without life",
-                    "G5 as a machine holds it: every period is the same.",
+                    "G5 as a machine holds it: pitch, level and tone colour do not change.",
                 ),
                 held(
                     Settings { life: 1.0, ..base },
@@ -209,7 +209,7 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
                 held(
                     Settings { vibrato: Vibrato { depth: 0.5, ..base.vibrato }, ..base },
                     "With vibrato",
-                    "It comes after the note has begun. Breath and lip swing together, no swing like the one before.",
+                    "It comes after the note has begun. Breath and lip swing together, and each cycle differs a little from the one before.",
                 ),
             ],
         ),

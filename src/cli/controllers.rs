@@ -107,7 +107,7 @@ pub fn set_by_map(decoder: &mut MidiDecoder, map: &ControllerMap) {
 /// Says which values of a map have no effect offline.
 pub fn only_in_the_plugin(map: &ControllerMap) -> Option<String> {
     let ids = map.values.iter().map(|(parameter, _)| *parameter);
-    let is_reed = |of: &Parameter| matches!(of.sets, Some(Sets::Reed(..) | Sets::ReedFace));
+    let is_reed = |of: &Parameter| matches!(of.sets, Some(Sets::Reed(..) | Sets::ReedDescription));
     let idle = ids.filter(|of| is_reed(of) || (of.sets.is_none() && !OF_THE_DECODER.contains(&of.id)));
     let names: Vec<_> = idle.map(|of| format!("{} ({})", of.name, of.id)).collect();
     (!names.is_empty()).then(|| {

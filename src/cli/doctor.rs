@@ -23,7 +23,7 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau doctor                            every port that may have a knob
   chalumeau doctor --path /dev/ttyUSB1        this port only; on Windows --path COM3
-  chalumeau doctor --osc --any-address        stock firmware, over Wi-Fi
+  chalumeau doctor --osc --network            stock firmware, over Wi-Fi
   chalumeau doctor --seconds 60               a longer look at rate and jitter";
 
 /// Longest wait for an answer; a board that restarts when its port is opened takes 5 s.
@@ -47,8 +47,8 @@ pub struct DoctorCommand {
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8000")]
     osc: Option<u16>,
     /// With --osc: listen to the whole network instead of this machine alone
-    #[arg(long, requires = "osc")]
-    any_address: bool,
+    #[arg(long, alias = "any-address", requires = "osc")]
+    network: bool,
     /// How long each knob is watched once it answers, s, 1..3600
     #[arg(long, value_name = "S", default_value_t = 3.0, value_parser = |s: &str| within(s, 1.0, 3600.0))]
     seconds: f64,
@@ -144,11 +144,11 @@ impl DoctorCommand {
     }
 
     fn ask_osc(&self, out: &mut impl Write, port: u16) -> io::Result<bool> {
-        let from = if self.any_address { "the whole network" } else { "this machine alone" };
+        let from = if self.network { "the whole network" } else { "this machine alone" };
         writeln!(out, "\nOSC at UDP port {port}, from {from}")?;
         out.flush()?;
         let (link, _reader) = KnobLink::spawn("chalumeau doctor", Hooks::default());
-        link.choose(KnobChoice::Osc { port, any_address: self.any_address });
+        link.choose(KnobChoice::Osc { port, any_address: self.network });
         let is_told = |phase: &Phase| !matches!(phase, Phase::Off | Phase::Searching | Phase::Waiting);
         let status = wait(&link, ANSWER.min(Duration::from_secs_f64(self.seconds + 1.0)), is_told);
         match &status.phase {
@@ -182,7 +182,7 @@ impl DoctorCommand {
                 )?;
                 writeln!(
                     out,
-                    "  and listen with --any-address. The port is {} as the firmware comes.",
+                    "  and listen with --network. The port is {} as the firmware comes.",
                     osc::PORT
                 )?;
             }
@@ -225,7 +225,7 @@ fn tell_what_next(out: &mut impl Write) -> io::Result<()> {
         "
 No knob answers. What to do next:
   A knob with a cable   plug it in and run this again; if its port is listed but not known, --path PORT
-  Stock firmware        chalumeau doctor --osc --any-address
+  Stock firmware        chalumeau doctor --osc --network
   No knob at all        {SIMULATOR}
 All steps: docs/touch.md"
     )
@@ -301,7 +301,7 @@ fn tell_info(out: &mut impl Write, info: &Info) -> io::Result<()> {
     }
     writeln!(
         out,
-        "  haptic loop {} Hz, {} counts a turn, at most {} mNm, limp {} ms after silence",
+        "  haptic loop {} Hz, {} counts a turn, at most {} mNm, no torque {} ms after silence",
         info.loop_hz,
         info.counts_per_turn,
         info.ceiling_mnm,

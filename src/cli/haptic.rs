@@ -41,7 +41,7 @@ Examples:
 ///
 /// Every note has its own pressure requirement p_req_pa = p_M gamma_on (see `threshold`), above which it sounds, and an
 /// extinction gamma_off above which the shut reed is silent. On the knob they lie at a_on_deg and a_off_deg; at
-/// a_close_deg a resting reed with a sharp facing would be shut. Contrast above 1 exaggerates how the torque differs between notes, Place above 1
+/// a_close_deg a reed that does not vibrate would be shut on a straight facing. Contrast above 1 exaggerates how the torque differs between notes, Place above 1
 /// how their angles differ; the requirement itself does not change. At a_on_deg the knob blows with gamma_sounding, where the
 /// reed as it moves begins to sound. At wall_deg a wall begins, a stiff spring; where a_off_deg lies beyond it, the hand meets the wall before the note falls silent. All pressures are those of the transfer-matrix model; `knob`, `report` and the plugin take those of
 /// the waveguide that is played, up to 2 % apart.

@@ -76,7 +76,7 @@ impl CurveRange {
 /// Calculate the input impedance of a fingering at the reed: a curve, or its peaks
 ///
 /// Values are over Zc = rho c / S of the nominal bore, 14.9 mm wide unless the instrument file names another. A clarinet sounds near a peak of its impedance; the register key
-/// spoils the first one so that the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
+/// weakens the first one and shifts it, so the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
 /// peaks; it is left out unless --reed-volume is given.
 ///
 /// A curve is of one note: choose it with --written. All notes need --peaks.

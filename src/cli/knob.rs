@@ -44,9 +44,9 @@ Examples:
   chalumeau knob
       Finds a knob behind a known serial board, real or simulated, and shows angle, gamma, threshold and whether it is armed.
   chalumeau knob --zero --written E3 --arm 60
-      The resistance of the lowest note, with at most 60 mNm. Ctrl-C lets go at once.
+      The resistance of the lowest note, with at most 60 mNm. Ctrl-C ends the torque at once.
   chalumeau knob --zero --arm 300 --law pressure --torque 260
-      Above 250 mNm the program asks a second time. A knob let go from such a spring disarms itself: hold it until it is back.
+      Above 250 mNm the program asks you to type the number. A knob let go from such a spring disarms itself: hold it until it is back.
   chalumeau knob --zero --written E3 --law pressure --arm 60
   chalumeau knob --osc 8000
       A TorqueTuner with its stock firmware.
@@ -55,10 +55,11 @@ Examples:
 
 /// Watch a knob, feel a note on it, record a take
 ///
-/// The knob makes torque only with --arm, and never more than --arm and its own limits allow. A knob that is there at once is armed at
-/// once; one that answers later than after 1.5 s is armed after Enter, and one that another program has is not. Torque ends with the program,
-/// however the program ends, and within 630 ms (880 over MIDI) when it stands still, for example after Ctrl-S in its
-/// terminal. Without --arm the knob turns freely and is only read.
+/// The knob makes torque only with --arm, and never more than --arm and its own limits allow. If the knob answers within
+/// 1.5 s, the program arms it. If it answers later, the program arms it after you press Enter. A knob that another program
+/// uses is not armed. When the program ends, for whatever reason, the torque ends. If the program hangs, for example after
+/// Ctrl-S in its terminal, the torque ends within 630 ms (880 ms over MIDI). Without --arm, the knob turns freely and is
+/// only read.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("which").args(["serial", "path", "midi", "osc"]))]
@@ -81,7 +82,7 @@ pub struct KnobCommand {
     /// Written note whose resistance is felt
     #[arg(long, value_name = "NOTE", default_value = "C5", value_parser = note)]
     written: u8,
-    /// Let the knob make torque, at most this many mNm, 10..450; above 250 the program asks a second time
+    /// Let the knob make torque, at most this many mNm, 10..450; above 250 the program asks you to type the number
     #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 10.0, f64::from(HARD_CEILING_MNM)))]
     arm: Option<f64>,
     /// First make the present position zero; it arms once the knob has shown an angle near zero

@@ -29,7 +29,7 @@ Examples:
 /// Find the notes of a recording: pitch, level, attack, harmonics
 ///
 /// For any WAV file with one voice: a clarinet before a microphone, or what `chalumeau render` wrote. Each line of the table is a
-/// note as it *sounds*; a B flat clarinet reads it two semitones higher. Cents are against equal temperament at --a4. The level is that of the
+/// note as it sounds; a B flat clarinet reads it two semitones higher. Cents are against equal temperament at --a4. The level is that of the
 /// steady part, dB re full scale, where a sine of full scale has -3.0; t90_s is the time from the beginning until 90 % of the steady level, short in a slur. The centroid is
 /// the power-weighted mean frequency, noise included. h1_db to h12_db are the harmonics, dB re the strongest. Of a long note the first
 /// four seconds are measured.

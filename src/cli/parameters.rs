@@ -2,12 +2,12 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
-use crate::parameters::PARAMETERS;
+use crate::parameters::{PARAMETERS, plain};
 use clap::Args;
 
 /// List all parameters: ids, names, ranges, units, defaults, and what can drive them
 ///
-/// Ids with `settable` yes can be given to --set of render, report, tune and bifurcation.
+/// Ids with `settable` yes can be given to --set of render, report, tune, realism and bifurcation.
 #[derive(Args)]
 pub struct ParametersCommand {
     #[command(flatten)]
@@ -33,7 +33,7 @@ impl ParametersCommand {
                 quoted(parameter.midi),
                 parameter.flag,
                 yes(parameter.sets.is_some()),
-                quoted(parameter.meaning),
+                quoted(&plain(parameter.meaning)),
             ))?;
         }
         table.finish()

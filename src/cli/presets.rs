@@ -44,7 +44,7 @@ struct ListCommand {
     table: TableArgs,
 }
 
-/// Print the text of a preset: the file that it is, or would be
+/// Print a preset in the form of a preset file
 #[derive(Args)]
 struct ShowCommand {
     /// Its name

@@ -28,8 +28,8 @@ enum Heard {
 
 /// Compare what is heard of bell and open holes with the power average over all directions
 ///
-/// Bell and open holes send out sound from different places. Above the cut-off of the open holes their flows go against each other, and
-/// what is heard depends on where one listens. The flows are those of the transfer matrices, for the same flow through the reed at all
+/// Bell and open holes send out sound from different places. Above the cut-off of the open holes their flows
+/// differ in phase, and what is heard depends on where one listens. The flows are those of the transfer matrices, for the same flow through the reed at all
 /// frequencies.
 ///
 /// Columns: written_midi,register,f_hz,average_db,heard_db. Frequencies are the centres of third octaves from that of the note up, or harmonics of the note; decibels are over one

@@ -343,7 +343,7 @@ fn value(parameter: &Parameter, settings: &Settings) -> Option<Value> {
             };
             (0..=parameter.steps()?).find(is).map(Value::Choice)
         }
-        Sets::Reed(..) | Sets::ReedFace => None,
+        Sets::Reed(..) | Sets::ReedDescription => None,
     }
 }
 

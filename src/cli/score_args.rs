@@ -66,8 +66,8 @@ pub struct ScoreArgs {
     /// The file is MPE: channel 1 is the manager, the other channels bend by 48 semitones
     #[arg(long, requires = "midi", conflicts_with = "note")]
     mpe: bool,
-    /// Each track with notes has a player and a seat of its own; in a file of one such track, each channel. Seats and their
-    /// width are those of several players, and pan (CC10) of a track moves its player
+    /// Give each track with notes its own player and seat. If only one track has notes, give each channel its own player.
+    /// --seats sets the width, and the pan (CC10) of a track moves its player
     #[arg(long, requires = "midi")]
     tracks: bool,
     /// Controllers of the file that move parameters: a device, see `chalumeau controllers list`, or a TOML file of links, as
@@ -91,11 +91,12 @@ pub struct ScoreArgs {
     /// all others are shut, and "" shuts all. The tuning stays that of the note
     #[arg(long, value_name = "HOLES", conflicts_with_all = ["midi", "scale"])]
     open_holes: Option<String>,
-    /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, with --replay the take's, with a longer --breath the
-    /// breath's; scale 0.5]
+    /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2; for a note of a scale 0.5;
+    /// with --replay the length of the take; with a longer --breath its length]
     #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, NOTE_S.0, NOTE_S.1))]
     seconds: Option<f64>,
-    /// Time to fade after the last event, s, 0..60 [default: 1, one note 0; more with a fall or a breath in]
+    /// Time to fade after the last event, s, 0..60 [default: 1; for a single note 0; longer with
+    /// --fall or --breath-in]
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 60.0))]
     tail: Option<f64>,
 

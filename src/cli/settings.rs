@@ -103,7 +103,7 @@ impl NumberFlags {
         Arg::new(arg_id(parameter))
             .long(long(parameter))
             .value_name(value_name)
-            .help(format!("{}, {range} [default: {default}]", parameter.meaning))
+            .help(format!("{}, {range} [default: {default}]", parameters::plain(parameter.meaning)))
             .action(ArgAction::Set)
             .value_parser(move |text: &str| flag_value(&number, text))
     }
@@ -321,7 +321,7 @@ impl SettingsArgs {
         let mut measured = self.measured;
         for Given { parameter, value, typed } in given {
             match (parameter.sets, value) {
-                (Some(Sets::ReedFace), Value::Choice(1)) => measured.is_used = true,
+                (Some(Sets::ReedDescription), Value::Choice(1)) => measured.is_used = true,
                 (Some(Sets::Reed(..)), Value::Number(value))
                     if measured.replace(parameter.id, f64::from(*value), nominal_radius_m).is_some() =>
                 {
@@ -334,7 +334,7 @@ impl SettingsArgs {
             }
         }
         let other = given.iter().find(|Given { parameter, value, .. }| match parameter.sets {
-            Some(Sets::ReedFace) => *value == Value::Choice(0),
+            Some(Sets::ReedDescription) => *value == Value::Choice(0),
             _ => ["reedh", "reedk", "reedc", "zeta"].contains(&parameter.id),
         });
         match other {
@@ -539,13 +539,13 @@ mod tests {
         for (words, says) in [
             (
                 &["--set", "vnt=2"][..],
-                &["no parameter \"vnt\": did you mean vent (Register vent)?", "chalumeau parameters"][..],
+                &["no parameter \"vnt\": did you mean vent (Vent loss)?", "chalumeau parameters"][..],
             ),
             (&["--set", "strength=3"], &["did you mean stren (Reed strength)?"]),
             (&["--set", "bfrom=keys"], &["bfrom (Breath from) belongs to a controller", "--controllers"]),
             (&["--set", "vent"], &["must be id=value"]),
-            (&["--set", "vent=9"], &["vent (Register vent) must lie in 0..4, got 9"]),
-            (&["--set", "register vent=9"], &["must lie in 0..4, got 9"]),
+            (&["--set", "vent=9"], &["vent (Vent loss) must lie in 0..4, got 9"]),
+            (&["--set", "vent loss=9"], &["must lie in 0..4, got 9"]),
             (&["--set", "temp=50 °C"], &["temp (Temperature) must lie in 10..40 °C"]),
             (&["--set", "tune=just"], &["must be one of Natural, Tempered"]),
             (&["--set", "instr=bass"], &["instr (Instrument)", "the flag is --instrument"]),

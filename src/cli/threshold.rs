@@ -29,7 +29,8 @@ const STRENGTHS: [f32; 5] = [2.0, 2.5, 3.0, 3.5, 4.0];
 ///
 /// gamma_on is that pressure over the closing pressure of the reed, from the height of the impedance peak the note plays
 /// on (frequency-domain model, reed volume included) and the flow strength zeta of the embouchure. That is the theory of a reed without inertia; it is never below 1/3, the value of a bore
-/// without losses. As the reed has inertia, some high notes begin up to a fifth below gamma_on, and D5 5 % above it: gamma_sounding of `chalumeau haptic`. A note without an impedance peak has nan.
+/// without losses. As the reed has inertia, some high notes begin up to 19 % below
+/// gamma_on, and D5 and E flat 5 some 5 % above it: gamma_sounding of `chalumeau haptic`. A note without an impedance peak has nan.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ThresholdCommand {

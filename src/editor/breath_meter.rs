@@ -79,7 +79,7 @@ pub fn named(marks: &PressureMarks, c: &Colours) -> [NamedMark; 4] {
 /// What each mark means, for tool tips.
 pub const LEGEND: &str = "speaks (p_on): the note starts to sound at this pressure, or stops.\n\
     beats: above this the reed touches the facing in each cycle, and the sound is bright.\n\
-    closes: this pressure would shut the reed at rest.\n\
+    closes: this pressure would shut a reed that does not vibrate.\n\
     chokes (p_off): above this the reed stays shut, and there is no sound.";
 
 /// The coloured bands of a scale: lower end, upper end, colour.

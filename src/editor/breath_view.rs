@@ -77,7 +77,7 @@ impl BreathView {
             }
         }
         if snapshot.sources.is_empty() {
-            ui.label("No source has sent a value yet. Key velocity sets the mouth pressure.");
+            ui.label("No source has sent a value yet. Key velocity sets the breath.");
         }
         // Under the meters: who has just plugged in a controller looks there.
         if hands.step("resp") == PLAYED {

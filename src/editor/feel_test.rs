@@ -43,7 +43,7 @@ impl FeelTest {
                 "Pushes back more the further you turn, up to 40 mNm at one turn, and returns to rest."
             }
             Self::Bump => {
-                "A bump at 120 degrees, like the point where a note speaks: the torque is small before it and drops a little after it."
+                "A mark at 120 degrees, like the point where a note speaks: the torque is small before it and drops a little after it."
             }
             Self::Wall => "Free up to 90 degrees, then a soft wall. It should not buzz when you lean on it.",
             Self::Slap => {

@@ -184,7 +184,7 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
     let x = rect.left() + 62.0;
     let verb = match kept.names {
         NoteNames::Written => "sounds",
-        NoteNames::Concert => "written",
+        NoteNames::Sounding => "written",
     };
     let other =
         named(kept.names.other()).map_or_else(String::new, |note| format!("{verb} {}", note_name(note)));
@@ -204,10 +204,10 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
     }
     let about = match kept.names {
         NoteNames::Written => {
-            "The written note, the note that this instrument sounds, and the measured pitch. Click to name notes by concert pitch everywhere."
+            "The written note, the note that this instrument sounds, and the measured pitch. Click to name notes by sounding pitch everywhere."
         }
-        NoteNames::Concert => {
-            "The sounding note (concert pitch), the note as it is written, and the measured pitch. Click to name notes as they are written everywhere."
+        NoteNames::Sounding => {
+            "The sounding note, the note as it is written, and the measured pitch. Click to name notes as they are written everywhere."
         }
     };
     response.on_hover_text(about);

@@ -258,7 +258,7 @@ fn column(
         ui.add_space(8.0);
     }
     ui.label(RichText::new("Names of notes").color(c.quiet));
-    let mut chosen = usize::from(*names == NoteNames::Concert);
+    let mut chosen = usize::from(*names == NoteNames::Sounding);
     let about = "As they are written for this instrument, or as they sound; in every view and on the keys.";
     segments(ui, "Names of notes", &NoteNames::ALL.map(|names| names.title().to_owned()), &mut chosen)
         .on_hover_text(about);

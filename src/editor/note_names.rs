@@ -11,27 +11,28 @@ pub enum NoteNames {
     /// The written one, as a clarinettist reads it.
     #[default]
     Written,
-    /// The sounding one.
-    Concert,
+    /// The sounding one, *concert* in the states of projects.
+    #[serde(rename = "concert")]
+    Sounding,
 }
 
 impl NoteNames {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Written, Self::Concert];
+    pub const ALL: [Self; 2] = [Self::Written, Self::Sounding];
 
     /// The text on its button.
     pub fn title(self) -> &'static str {
         match self {
             Self::Written => "Written",
-            Self::Concert => "Concert",
+            Self::Sounding => "Sounding",
         }
     }
 
     /// The other one.
     pub fn other(self) -> Self {
         match self {
-            Self::Written => Self::Concert,
-            Self::Concert => Self::Written,
+            Self::Written => Self::Sounding,
+            Self::Sounding => Self::Written,
         }
     }
 
@@ -39,7 +40,7 @@ impl NoteNames {
     pub fn of_sounding(self, note: SoundingNote, transposition: i8) -> Option<u8> {
         match self {
             Self::Written => note.written(transposition).map(|note| note.0),
-            Self::Concert => Some(note.0),
+            Self::Sounding => Some(note.0),
         }
     }
 
@@ -47,7 +48,7 @@ impl NoteNames {
     pub fn of_written(self, note: WrittenNote, transposition: i8) -> Option<u8> {
         match self {
             Self::Written => Some(note.0),
-            Self::Concert => note.sounding(transposition).map(|note| note.0),
+            Self::Sounding => note.sounding(transposition).map(|note| note.0),
         }
     }
 }
@@ -65,7 +66,7 @@ mod tests {
     #[test]
     fn both_kinds_of_names_name_the_same_note() {
         let (written, sounding) = (WrittenNote(60), SoundingNote(58));
-        for (names, wanted) in [(NoteNames::Written, 60), (NoteNames::Concert, 58)] {
+        for (names, wanted) in [(NoteNames::Written, 60), (NoteNames::Sounding, 58)] {
             assert_eq!(names.of_written(written, 2), Some(wanted));
             assert_eq!(names.of_sounding(sounding, 2), Some(wanted));
             assert_eq!(names.other().other(), names);

@@ -189,7 +189,7 @@ impl ReedView {
                 lines.push(("thin: under the player's lip", c.breath));
             }
             if kpa > f64::from(NO_BREATH_KPA) {
-                lines.push(("circle: at rest", c.breath));
+                lines.push(("circle: equilibrium", c.breath));
             }
             // Clear of the handle on the axis.
             let from = transform.position_from_point(&PlotPoint::new(0.0, 0.0)) + vec2(8.0, HANDLE);

@@ -14,6 +14,7 @@ use crate::editor::linked_controllers;
 use crate::editor::terms;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
+use crate::parameters;
 
 /// The tool tip of a parameter: the word, what it does to sound and feel, how to move it.
 pub fn teach(ui: &mut Ui, id: &str, how: &str) {
@@ -21,13 +22,11 @@ pub fn teach(ui: &mut Ui, id: &str, how: &str) {
     let c = Colours::here(ui);
     let Some(term) = terms::of(id) else { return };
     ui.set_max_width(300.0);
-    // Names of other parameters stand between asterisks, as documents print them.
-    let plain = |text: &str| text.replace('*', "");
-    ui.label(egui::RichText::new(plain(term.meaning)).strong());
+    ui.label(egui::RichText::new(parameters::plain(term.meaning)).strong());
     // Who has no knob feels nothing.
     let feel = if can_feel { term.feel } else { "" };
     for (what, text) in [("Sound", term.sound), ("Feel", feel)] {
-        let text = plain(text);
+        let text = parameters::plain(text);
         if !text.is_empty() {
             ui.label(if feel.is_empty() { text } else { format!("{what}: {text}") });
         }

@@ -212,8 +212,8 @@ pub static PARAMETERS: &[Parameter] = &[
         choice(&[("any", "Any"), ("cc2", "CC2"), ("cc11", "CC11"), ("press", "Pressure"), ("keys", "Keys")]),
     )
     .help(
-        "Which controller blows",
-        "Any: whichever moves; CC2 overrides CC11, and CC11 overrides channel pressure. Pressure under a held key adds to its velocity; with Pressure it blows. Keys: the velocity, whatever controllers do. Automation of *Breath*, note expressions, linked controllers and the knob blow in any case.",
+        "Which source sets the breath",
+        "Any: whichever moves; CC2 overrides CC11, and CC11 overrides channel pressure. Pressure under a held key adds to its velocity; with Pressure it sets the breath. Keys: the velocity, whatever controllers do. Automation of *Breath*, note expressions, linked controllers and the knob set the breath in any case.",
         "",
     ),
     entry("bdead", BREATH, "Breath deadband", share([0.0, 0.1], 0.0))
@@ -322,7 +322,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::TemperatureC))
         .flag("--temperature"),
-    entry("vent", TUNING, "Register vent", number([0.0, 4.0], 2.0, 2, ""))
+    entry("vent", TUNING, "Vent loss", number([0.0, 4.0], 2.0, 2, ""))
         .help(
             "Loss of the air jets in open holes",
             "At 0 there is no loss, and most of the clarion register does not speak: the register key needs this loss to work.",
@@ -369,7 +369,7 @@ pub static PARAMETERS: &[Parameter] = &[
     )
     .help(
         "Kind of knob",
-        "Knobs on serial and MIDI can be felt. A knob with stock firmware on OSC plays, but cannot be felt.",
+        "Serial and MIDI port: each note has its own feel. OSC: the knob plays, but the plugin cannot change its feel.",
         "",
     )
     .setup()
@@ -479,14 +479,14 @@ pub static PARAMETERS: &[Parameter] = &[
         .help(
             "Height of the step at the threshold, under the pressure law",
             "",
-            "You feel a click where the note speaks. *Feel mark* is its counterpart under the flow law.",
+            "You feel a step where the note speaks. *Feel mark* is its counterpart under the flow law.",
         )
         .flag("--detent")
         .setup(),
     entry("curve", KNOB, "Knob curve", number([0.25, 4.0], 1.0, 2, ""))
         .help(
             "Exponent of the travel from rest to full breath",
-            "For knobs that cannot be felt. Values above 1 give soft breath more of the travel.",
+            "Only for a knob on OSC. Values above 1 give soft breath more of the travel.",
             "",
         )
         .setup()
@@ -576,7 +576,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .help(
             "Height of the mark at the threshold, under the flow law",
             "",
-            "A bump where the note speaks. Without it the torque there is so flat that a hand cannot find the place.",
+            "A mark where the note speaks. Without it the torque there is so flat that a hand cannot find the place.",
         )
         .flag("--detent")
         .setup(),
@@ -618,13 +618,13 @@ pub static PARAMETERS: &[Parameter] = &[
         .setup()
         .act()
         .never_restored(),
-    entry("rface", PHYSICAL_REED, "Reed face", choice(&[("seed", "Dimensionless"), ("phys", "Physical")]))
+    entry("rface", PHYSICAL_REED, "Reed description", choice(&[("seed", "Dimensionless"), ("phys", "Physical")]))
         .help(
             "How the reed is given: as dimensionless H, k and zeta, or as a maker measures it",
             "Both describe the same reed. The values that are shown are in use.",
             "The torque curve changes as the sound does.",
         )
-        .sets(Sets::ReedFace)
+        .sets(Sets::ReedDescription)
         .setup(),
     entry("rstiff", PHYSICAL_REED, "Reed stiffness", number([300.0, 6_000.0], 1_218.057_3, 1, " N/m"))
         .help(
@@ -786,7 +786,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("gliss", EXPRESSION, "Glissando", number([0.0, 3.0], 0.0, 2, " s"))
         .help(
             "Time that a slur slides from note to note; at 0 the fingers move at once",
-            "The fingers slide off the holes one after another, and the vocal tract leads them.",
+            "The fingers slide off the holes one after another, and across the break the vocal tract sets the pitch.",
             "",
         )
         .sets(Sets::Number(SettingNumber::GlissandoS))
@@ -971,8 +971,8 @@ pub static PARAMETERS: &[Parameter] = &[
         .flag("--seats"),
     entry("mic", MICROPHONE, "Microphone", OFF)
         .help(
-            "Whether wind at a microphone blows: the side-chain of the CLAP, the input of *Chalumeau (microphone)* (VST3), or that of the program",
-            "Blow at the microphone while you hold keys. Speech, singing, music and the room do not blow. While it blows, no other source does but the knob. An input that nothing is connected to changes nothing.",
+            "Whether wind at a microphone sets the breath: the side-chain of the CLAP, the input of *Chalumeau (microphone)* (VST3), or that of the program",
+            "Blow at the microphone while you hold keys. Speech, singing, music and the room do not. Meanwhile, no other source sets the breath but the knob. An input that nothing is connected to changes nothing.",
             "",
         )
         .setup()

@@ -32,7 +32,7 @@ Examples:
 
 Play it with a MIDI keyboard, a wind controller, a knob, or the keys in the window. MIDI devices play as soon as you \
 plug them in. CC2 or CC11 sets the breath. Until one of them moves, key velocity sets it. On the computer's keyboard, \
-letters play: A S D F G H J K are the white keys from C. The next start finds the settings of this one. The \
+letters play: A S D F G H J K L are the white keys from middle C. The next start finds the settings of this one. The \
 Instrument view lists sound outputs and MIDI inputs to choose from. With a microphone, hold keys and blow at it; keep \
 quiet for the first two seconds, in which the program measures the room. Without a display, the program plays without \
 a window. To quit, close the window or press Ctrl-C.";

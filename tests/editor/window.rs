@@ -896,12 +896,12 @@ fn notes_are_named_as_written_or_as_they_sound_in_every_view() {
     assert!(label(&window, "Fingering E3") && !label(&window, "Fingering D3"));
     window.harness.get_by_label_contains("Written C4").click();
     window.harness.run();
-    assert!(label(&window, "Concert Bb3, written C4"));
+    assert!(label(&window, "Sounding Bb3, written C4"));
     assert!(label(&window, "Fingering D3"), "the lowest fingering has its sounding name");
-    assert_eq!(window.harness.state().kept.names, NoteNames::Concert);
+    assert_eq!(window.harness.state().kept.names, NoteNames::Sounding);
     // The instrument's view has the same choice.
     let mut window = Window::tall(Tab::Instrument);
-    click(&mut window, "Names of notes: Concert");
-    assert_eq!(window.harness.state().kept.names, NoteNames::Concert);
-    assert!(label(&window, "Concert Bb3, written C4"));
+    click(&mut window, "Names of notes: Sounding");
+    assert_eq!(window.harness.state().kept.names, NoteNames::Sounding);
+    assert!(label(&window, "Sounding Bb3, written C4"));
 }

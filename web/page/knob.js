@@ -105,7 +105,7 @@ export class Knob {
       this.strayDeg = stray ? Number(stray) : null;
       this.isWarned &&= this.isLive && this.strayDeg !== null;
       if (this.isArmed) this.isBack = false;
-      const back = this.isBack ? 'the knob is back; if it has restarted, its zero is where it stood then: press This is zero' : '';
+      const back = this.isBack ? 'the knob is back; if it has restarted, its zero is where it stood then: press Rest here' : '';
       const silent = !this.isLive && performance.now() - this.openedAt > ANSWER_MS;
       const name = silent && who === 'waiting for an answer' ? 'Nothing answers at this port. Is it a TorqueTuner with the firmware of firmware/?' : who;
       const limits = Number(most) > 0 ? { most: Number(most), stiffness: Number(stiffness), push: Number(push) } : null;
@@ -141,7 +141,7 @@ export class Knob {
     if (!event.isTrusted || !this.port || document.hidden) return '';
     if (this.strayDeg !== null && this.strayDeg !== undefined && !this.isWarned) {
       this.isWarned = true;
-      return `not armed: the knob stands ${this.strayDeg.toFixed(0)} degrees from its zero, and may turn back there by itself. Let go of it and press This is zero, or press Arm again`;
+      return `not armed: the knob stands ${this.strayDeg.toFixed(0)} degrees from its zero, and may turn back there by itself. Let go of it and press Rest here, or press Arm again`;
     }
     Object.assign(this, { isWanted: true, isSeen: false, wantedAt: performance.now() });
     this.send({ knob: ['arm', ceiling] });

@@ -317,7 +317,7 @@ function hear(message) {
   if (message.taken === false) holes.refuse();
   if (message.microphoneGone && blowing) {
     toggleMicrophone();
-    say('The microphone has gone.');
+    say('The microphone was disconnected.');
   }
   knob.hear(message);
   if ('blowing' in message) get('microphone').classList.toggle('blowing', message.blowing);
@@ -366,8 +366,8 @@ function announce(text) {
 /** Where the breath comes from. */
 function breathing() {
   if (room) return room.calibrating ? 'Microphone' : 'Breath: microphone';
-  if (isTouched) return 'Breath: your hand';
-  return origin && !(midi.isTaken && BLOWING.includes(origin)) ? `Breath found: ${origin}` : 'Breath: keys';
+  if (isTouched) return 'Breath: mouse or finger';
+  return origin && !(midi.isTaken && BLOWING.includes(origin)) ? `Breath: ${origin}` : 'Breath: keys';
 }
 
 async function toggleMicrophone() {

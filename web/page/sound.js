@@ -2,9 +2,9 @@
 
 /** Why this browser cannot play the page, if it cannot. */
 export function whySilent() {
-  if (!globalThis.AudioContext || !globalThis.WebAssembly) return 'this browser is too old. It takes one of 2023 or later';
+  if (!globalThis.AudioContext || !globalThis.WebAssembly) return 'this browser is too old: use one from 2023 or later';
   if (!globalThis.isSecureContext) return `a browser plays this page from https or from localhost only, and not from ${location.origin}`;
-  if (!globalThis.AudioWorkletNode) return 'this browser has no AudioWorklet. It takes one of 2023 or later';
+  if (!globalThis.AudioWorkletNode) return 'this browser has no AudioWorklet: use one from 2023 or later';
   return undefined;
 }
 

@@ -243,7 +243,7 @@ const TESTS = {
     await wind(0x90, 60, 100);
     for (let breath = 8; breath <= 90; breath += 2) await wind(0xb0, 2, breath);
     await until(page, LEVEL, HEARD);
-    await page.waitForFunction(() => document.getElementById('breathing').textContent === 'Breath found: CC2');
+    await page.waitForFunction(() => document.getElementById('breathing').textContent === 'Breath: CC2');
     assert.equal((await latest(page))[KEY], 60);
     const loud = await settled(page, DYNAMIC);
     await wind(0xb0, 2, 30);

@@ -236,7 +236,7 @@ const MIDI = {
     await wind(0x80, 60, 0);
     await wind(0xb0, 2, 0);
     await silence(page);
-    await says(page, /^Breath found: CC2$/, 'breathing');
+    await says(page, /^Breath: CC2$/, 'breathing');
     await plays();
     await says(page, /^Breath: keys$/, 'breathing');
     // A note of the controller has its own breath again: none, and then some.

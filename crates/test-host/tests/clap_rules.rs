@@ -99,7 +99,7 @@ fn parameters_are_described_by_the_rules() {
         "k from",
         "Instrument",
         "Offline quality",
-        "Reed face",
+        "Reed description",
         "Heard from",
         "Attack",
         "Mod wheel",

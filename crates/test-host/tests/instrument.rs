@@ -350,7 +350,7 @@ fn a_state_from_before_instruments_is_the_b_flat_clarinet() {
         ("Instrument", "B flat clarinet"),
         ("Offline quality", "Same as live"),
         ("Bend range", "2 st"),
-        ("Reed face", "Dimensionless"),
+        ("Reed description", "Dimensionless"),
         ("A4", "442.0 Hz"),
     ] {
         let param = plugin.param(name).unwrap();

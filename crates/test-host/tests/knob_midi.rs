@@ -303,7 +303,7 @@ fn the_doctor_hears_a_midi_knob_and_misses_it_when_it_is_gone() {
     let found = ask();
     println!("{found}");
     let serial = format!("{:016x}", knob.number);
-    for say in [&serial, "tier 2", "limp 380 ms after silence", "FEEL to its echo"] {
+    for say in [&serial, "tier 2", "no torque 380 ms after silence", "FEEL to its echo"] {
         assert!(found.contains(say), "{say:?} in {found}");
     }
     assert!(!found.contains("not seen"), "{found}");

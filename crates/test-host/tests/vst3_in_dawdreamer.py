@@ -15,7 +15,7 @@ OURS = [
     "Breath", "Full breath", "Tongue", "Legato", "Breath response", "Breath curve", "Softest breath", "Loudest breath",
     "Breath from", "Breath deadband",
     "Reed strength", "Lip opening", "Embouchure", "Lip damping", "Reed H", "Reed k", "Reed coupled", "Reed A", "Facing",
-    "A4", "Tuning", "Temperature", "Register vent", "Transpose", "Beyond the range", "Breath noise", "Gain", "Panic",
+    "A4", "Tuning", "Temperature", "Vent loss", "Transpose", "Beyond the range", "Breath noise", "Gain", "Panic",
 ]
 
 

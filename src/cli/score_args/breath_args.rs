@@ -33,8 +33,8 @@ pub(super) struct BreathArgs {
     #[arg(long, value_name = "FROM:TO")]
     pub crescendo: Option<String>,
     /// Breath from a recorded take: a CSV file with t_us and angle_deg, from the plugin or `chalumeau knob`. Each note turns
-    /// the angle into its own pressure. The take's own feel is used; flags of the feel replace it. The take's gamma is what the hand
-    /// felt; with --breath-response physical it blows
+    /// the angle into its own pressure. The take's own feel is used; flags of the feel replace it. The column gamma is the
+    /// pressure that the hand felt. With --breath-response physical, the reed is blown with exactly this pressure
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
 }

@@ -93,10 +93,10 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
             page.add_param(&embouchure.zeta);
             page.add_param(&embouchure.damping);
             page.add_param(&reed.lay);
-            page.add_param(&physical.face);
+            page.add_param(&physical.description);
         });
         section.add_page("Reed, physical", |page| {
-            page.add_param(&physical.face);
+            page.add_param(&physical.description);
             page.add_param(&physical.stiffness);
             page.add_param(&physical.area);
             page.add_param(&physical.width);

@@ -92,7 +92,7 @@ impl KnobSwitches {
         if self.was_armed && !status.armed {
             self.wait_after_stop();
             if now.arm {
-                self.set_hint("disarmed: switch Arm on again".to_owned());
+                self.set_hint("disarmed: press ARM again".to_owned());
             }
         }
         self.was_armed = status.armed;
@@ -101,7 +101,7 @@ impl KnobSwitches {
         }
         if moments.take(Moment::Rest) {
             if status.armed || status.arming || self.asked.is_some() {
-                self.set_hint("Rest here: switch Arm off first".to_owned());
+                self.set_hint("Rest here: press STOP first".to_owned());
             } else {
                 calibrator.rest();
             }
@@ -142,7 +142,7 @@ impl KnobSwitches {
             self.asked = None;
         } else if self.asked.is_some_and(|asked| asked.elapsed() > ARM_WITHIN) {
             self.asked = None;
-            self.set_hint("the knob did not arm: switch Arm on again".to_owned());
+            self.set_hint("the knob did not arm: press ARM again".to_owned());
         }
         if !is_live(status) {
             self.due = None;
@@ -157,12 +157,12 @@ impl KnobSwitches {
         } else if is_pressed && now.arm && self.is_due() {
             self.due = None;
             if calibrator.is_busy() {
-                self.set_hint("not armed: wait until the knob is calibrated, then switch Arm on".to_owned());
+                self.set_hint("not armed: wait until the knob is calibrated, then press ARM".to_owned());
             } else if let Some(stray_deg) = status.stray_deg.filter(|_| !self.is_warned) {
                 self.is_warned = true;
                 self.set_hint(format!(
                     "not armed: the knob stands {stray_deg:.0} degrees from its zero, and may turn back there by itself. Let \
-                     go of it and press Rest here, or switch Arm on again"
+                     go of it and press Rest here, or press ARM again"
                 ));
             } else {
                 link.arm(now.ceiling_mnm);
@@ -171,7 +171,7 @@ impl KnobSwitches {
             }
         } else if is_pressed {
             self.wait_after_stop();
-            self.set_hint("not armed: wait a second, then switch Arm on".to_owned());
+            self.set_hint("not armed: wait a second, then press ARM".to_owned());
         } else if !now.arm && before.arm {
             link.disarm();
             self.asked = None;
@@ -180,7 +180,7 @@ impl KnobSwitches {
                 self.hint = None;
             }
         } else if status.armed && now.ceiling_mnm > before.ceiling_mnm {
-            self.set_hint("to allow more torque, switch Arm off and on again".to_owned());
+            self.set_hint("to allow more torque, press STOP, then ARM".to_owned());
         }
     }
 }

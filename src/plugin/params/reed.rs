@@ -1,4 +1,4 @@
-//! The physical reed's face: the same reed as a maker measures it.
+//! The physical reed's description: the same reed as a maker measures it.
 
 use nice_plug::prelude::*;
 
@@ -8,7 +8,7 @@ use chalumeau_core::reed::PhysicalReed;
 
 /// Which of the reed's two faces rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
-pub enum ReedFace {
+pub enum ReedDescription {
     /// The seed's H, k and A, and zeta.
     #[id = "seed"]
     #[name = "Dimensionless"]
@@ -19,12 +19,12 @@ pub enum ReedFace {
     Physical,
 }
 
-/// The reed in newtons and millimetres. Lip and strength act on top, as on the other face.
+/// The reed in newtons and millimetres. Lip and strength act on top, as on the other description.
 #[derive(Params)]
 pub struct PhysicalReedParams {
-    /// Which face rules. Default dimensionless.
+    /// Which description rules. Default dimensionless.
     #[id = "rface"]
-    pub face: EnumParam<ReedFace>,
+    pub description: EnumParam<ReedDescription>,
     /// K, N/m. Default the reference reed's.
     #[id = "rstiff"]
     pub stiffness: FloatParam,
@@ -42,7 +42,7 @@ pub struct PhysicalReedParams {
 impl Default for PhysicalReedParams {
     fn default() -> Self {
         Self {
-            face: choice("rface"),
+            description: choice("rface"),
             stiffness: number("rstiff"),
             area: number("rarea"),
             width: number("rwidth"),
@@ -63,7 +63,7 @@ impl PhysicalReedParams {
         }
     }
 
-    /// Settings whose reed is this one, if this face rules, as on a B flat clarinet: a larger instrument has a reed as much
+    /// Settings whose reed is this one, if this description rules, as on a B flat clarinet: a larger instrument has a reed as much
     /// larger. Lip, strength and A act on top. Real-time safe.
     pub fn over(&self, settings: Settings) -> Settings {
         if !self.rules() {
@@ -74,7 +74,7 @@ impl PhysicalReedParams {
 
     /// Whether it rules. Real-time safe.
     pub fn rules(&self) -> bool {
-        self.face.value() == ReedFace::Physical
+        self.description.value() == ReedDescription::Physical
     }
 }
 
@@ -85,14 +85,14 @@ mod tests {
     use chalumeau_core::reed::physical::P_REF_PA;
     use chalumeau_core::units::{Air, REFERENCE_RADIUS_M};
 
-    fn face(face: ReedFace, change: impl Fn(&mut PhysicalReed)) -> PhysicalReedParams {
+    fn description(description: ReedDescription, change: impl Fn(&mut PhysicalReed)) -> PhysicalReedParams {
         let mut reed = PhysicalReed::reference();
         change(&mut reed);
         let fixed = |value: f64, unit: f64| {
             FloatParam::new("", (value * unit) as f32, FloatRange::Linear { min: 0.0, max: 1e4 })
         };
         PhysicalReedParams {
-            face: EnumParam::new("Reed face", face),
+            description: EnumParam::new("Reed description", description),
             stiffness: fixed(reed.stiffness_n_m, 1.0),
             area: fixed(reed.area_m2, 1e6),
             width: fixed(reed.width_m, 1e3),
@@ -102,14 +102,14 @@ mod tests {
 
     #[test]
     fn the_other_face_says_nothing() {
-        let params = face(ReedFace::Dimensionless, |reed| reed.stiffness_n_m *= 2.0);
+        let params = description(ReedDescription::Dimensionless, |reed| reed.stiffness_n_m *= 2.0);
         assert_eq!(params.over(Settings::default()), Settings::default());
     }
 
     #[test]
     fn both_faces_of_the_reference_reed_are_one_reed() {
         let (seed, physical) =
-            (Settings::default(), face(ReedFace::Physical, |_| {}).over(Settings::default()));
+            (Settings::default(), description(ReedDescription::Physical, |_| {}).over(Settings::default()));
         let near = |a: f32, b: f32| (a / b - 1.0).abs() < 1e-6;
         assert!(near(seed.reed_h, physical.reed_h) && near(seed.reed_k, physical.reed_k), "{physical:?}");
         assert!(near(seed.zeta, physical.zeta), "{physical:?}");
@@ -124,7 +124,7 @@ mod tests {
             |reed: &mut PhysicalReed| reed.tip_opening_m *= 0.7,
             |reed: &mut PhysicalReed| reed.width_m *= 0.6,
         ] {
-            let params = face(ReedFace::Physical, change);
+            let params = description(ReedDescription::Physical, change);
             let (reed, settings) = (params.reed(), params.over(Settings::default()));
             assert!((settings.closing_pa() / reed.closing_pa() - 1.0).abs() < 1e-5, "{reed:?}");
             // Zeta is flow at rest over the root of the closing pressure: zeta_ref (H / H_ref) over the root of p_M / P.

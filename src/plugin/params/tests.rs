@@ -10,7 +10,7 @@ use super::instrument::{InstrumentChoice, QualityChoice};
 use super::knob::{KnobKind, LawChoice, OrderChoice};
 use super::listening::ListeningChoice;
 use super::players::SplitChoice;
-use super::reed::ReedFace;
+use super::reed::ReedDescription;
 use super::techniques::{AttackChoice, GrowlPitchChoice, KeySwitchesChoice, WheelChoice};
 use super::*;
 use crate::parameters::{Choice, Kind, PARAMETERS, Sets, Value, find};
@@ -61,7 +61,7 @@ fn choices_have_the_ids_and_texts_of_the_table() {
         same::<ReedSource>("ksrc"),
         same::<InstrumentChoice>("instr"),
         same::<QualityChoice>("qual"),
-        same::<ReedFace>("rface"),
+        same::<ReedDescription>("rface"),
         same::<ListeningChoice>("heard"),
         same::<AttackChoice>("attack"),
         same::<WheelChoice>("wheel"),

@@ -61,7 +61,7 @@ pub fn list(
     devices.push(KnobDevice {
         key: OSC.into(),
         name: "TorqueTuner with stock firmware, by OSC".into(),
-        state: "read only: angle to breath, no feel".into(),
+        state: "read only: its angle sets the breath; its feel cannot change".into(),
         is_chosen: kind == KnobKind::Osc,
         is_free: true,
         is_knob: kind == KnobKind::Osc,

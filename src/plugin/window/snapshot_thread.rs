@@ -329,7 +329,13 @@ impl SnapshotThread {
             let (is_key_down, breath) = (inside.now.key.is_some(), sources.value(input).unwrap_or(0.0));
             if is_key_down && breath == 0.0 {
                 // Else a key that is silent would puzzle who has forgotten a controller.
-                add(Severity::Note, format!("Panic lets the keys blow again: {} is at 0", input.title()));
+                add(
+                    Severity::Note,
+                    format!(
+                        "{} is at 0, so the note is silent. Panic lets key velocity set the breath.",
+                        input.title()
+                    ),
+                );
             } else {
                 add(Severity::Good, format!("breath: {}", input.title()));
             }

@@ -59,7 +59,8 @@ const PLAIN_GAP_US: i64 = 200_000;
 /// without noticing.
 pub const STRAY_DEG: f64 = 5.0;
 /// What a restart means, after what has happened.
-pub const ZERO_IS_LOST: &str = "its zero is where it stood then: set it again (Rest here; --zero on the command line; This is zero on the web page)";
+pub const ZERO_IS_LOST: &str =
+    "its zero is where it stood then: set it again (Rest here; on the command line --zero)";
 
 /// One measurement of the knob, for recording and study.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
