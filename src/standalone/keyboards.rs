@@ -322,6 +322,34 @@ impl<P: Plugin<SysExMessage = ()>, C: ProcessContext<P>> ProcessContext<P> for W
 mod tests {
     use super::*;
 
+    /// What is down after these messages.
+    fn after(messages: &[[u8; 3]]) -> Down {
+        let mut down = Down::default();
+        messages.iter().for_each(|bytes| note_keys(&mut down, bytes));
+        down
+    }
+
+    #[test]
+    fn a_port_that_goes_ends_its_own_notes_alone() {
+        let gone = after(&[
+            [0x90, 60, 100],
+            [0x90, 62, 90],
+            [0x90, 62, 0],
+            [0x95, 64, 1],
+            [0x85, 65, 0],
+            [0x90, 67, 80],
+            [0xB0, SUSTAIN, 64],
+            [0xB5, SUSTAIN, 63],
+            [0xB0, 1, 127],
+        ]);
+        let alone = endings(&gone, &[]);
+        assert_eq!(alone, [[0xB0, SUSTAIN, 0], [0x80, 60, 0], [0x80, 67, 0], [0x85, 64, 0]]);
+        // Another keyboard holds one of the keys, and the pedal; a third has the key of another channel.
+        let others = [after(&[[0x90, 60, 1], [0xB0, SUSTAIN, 127]]), after(&[[0x94, 64, 1]])];
+        assert_eq!(endings(&gone, &others), [[0x80, 67, 0], [0x85, 64, 0]]);
+        assert!(endings(&Down::default(), &others).is_empty());
+    }
+
     #[test]
     fn keyboards_play_unasked_and_knobs_and_loops_do_not() {
         assert!(plays_unasked(["Arturia KeyStep 32:Arturia KeyStep 32 MIDI 1 28:0"]));

@@ -12,7 +12,7 @@ const [folder, own] = process.argv.slice(2);
 /** `chalumeau` with the simulated knob. */
 const PROGRAM = process.env.CHALUMEAU ?? new URL('../../target/debug/chalumeau', import.meta.url).pathname;
 /** Types of frames (docs/protocol.md), and the session of the golden ones. */
-const [HELLO, ARM, FREE] = [0x01, 0x03, 0x05];
+const [HELLO, ARM, FREE, BYE] = [0x01, 0x03, 0x05, 0x08];
 const GOLDEN_SESSION = 0xdeadbeef;
 /** Longest time until a knob is free after a sign of life has stopped: 500 ms of patience, and as much for a busy machine, ms. */
 const FREE_MS = 1000;
@@ -291,7 +291,7 @@ const TESTS = {
     return `${bad.length} bad frames did nothing`;
   },
 
-  async 'the page plays the simulated knob, which stays limp'(browser) {
+  async 'the page plays the simulated knob, and no program arms it'(browser) {
     const knob = await simulator(PROGRAM, '--hold', '150');
     const { page, context, errors } = await open(browser, server.address, { before: `${serialPort(knob.address)};${SLOW}`, serviceWorkers: 'block' });
     const isFree = (state) => !state.armed && state.torque === 0;
@@ -308,15 +308,44 @@ const TESTS = {
       await page.keyboard.up('d');
       await page.keyboard.press('Escape');
       await silence(page);
-      // FEEL has arrived, and nothing but a click arms.
-      await page.evaluate(() => document.getElementById('knob-arm').click());
-      await page.waitForTimeout(300);
+      // FEEL has arrived, the knob stands at its zero, and nothing but the user's own click arms.
+      await page.click('#knob-zero');
+      await until(page, 8, -0.1, 0.1);
+      await page.waitForFunction(() => !document.getElementById('knob-arm').disabled && globalThis.chalumeau.knob.knob.strayDeg === null);
+      for (let time = 0; time < 2; time += 1) {
+        await page.evaluate(() => document.getElementById('knob-arm').click());
+        await page.waitForTimeout(700);
+      }
+      assert.ok(!typesOf(await page.evaluate(() => globalThis.serialPort.written)).includes(ARM), 'a program has armed the knob');
       assert.ok(knob.states.length > 50 && knob.states.every(isFree), 'torque without an act of the user');
       assert.deepEqual(errors, []);
     } finally {
       await context.close();
       await knob.end();
     }
+  },
+
+  async 'what ends torque is written at once'(browser) {
+    const { page, context, errors } = await open(browser, server.address, { before: serialPort(undefined, GOLDEN_SESSION), serviceWorkers: 'block' });
+    await page.click('#knob');
+    await page.waitForFunction(() => globalThis.chalumeau.knob.knob.farewell);
+    // What the audio thread sends comes later, as a message of its own.
+    const writtenAt = async (act) => typesOf(await page.evaluate(async (act) => {
+      const { written } = globalThis.serialPort;
+      const before = written.length;
+      new Function(act)();
+      for (let turn = 0; turn < 50; turn += 1) await undefined;
+      return written.slice(before);
+    }, act));
+    const hide = (hidden) => `Object.defineProperty(document, 'hidden', { value: ${hidden}, configurable: true }); document.dispatchEvent(new Event('visibilitychange'))`;
+    assert.deepEqual(await writtenAt("document.getElementById('knob-stop').click()"), [FREE], 'Stop');
+    assert.deepEqual(await writtenAt("document.getElementById('knob-stop').dispatchEvent(new Event('pointerdown'))"), [FREE], 'Stop, pressed');
+    assert.deepEqual(await writtenAt("globalThis.chalumeau.knob.knob.isWanted = true; dispatchEvent(new KeyboardEvent('keydown', { code: 'Escape' }))"), [FREE], 'Escape');
+    assert.deepEqual(await writtenAt(hide(true)), [FREE], 'hidden');
+    assert.deepEqual(await writtenAt(hide(false)), [], 'shown again');
+    for (const leave of ['pagehide', 'beforeunload']) assert.deepEqual(await writtenAt(`dispatchEvent(new Event('${leave}'))`), [FREE, BYE], leave);
+    assert.deepEqual(errors, []);
+    await context.close();
   },
 
   async 'a damaged byte does not lose the knob'(browser) {
@@ -394,7 +423,8 @@ const TESTS = {
 
   async 'what is held is let go when the page is left or hidden'(browser) {
     const { page, context, errors } = await open(browser, server.address, { serviceWorkers: 'block' });
-    for (const leave of ["dispatchEvent(new Event('blur'))", "dispatchEvent(new Event('pagehide'))"]) {
+    const hidden = "Object.defineProperty(document, 'hidden', { value: true, configurable: true }); document.dispatchEvent(new Event('visibilitychange')); delete document.hidden";
+    for (const leave of ["dispatchEvent(new Event('blur'))", "dispatchEvent(new Event('pagehide'))", hidden]) {
       for (const part of ['#clarinet', '#keyboard']) {
         const box = await page.locator(part).boundingBox();
         await page.mouse.move(box.x + 0.4 * box.width, box.y + 0.8 * box.height);

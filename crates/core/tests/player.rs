@@ -239,6 +239,42 @@ fn a_soft_attack_blooms() {
     assert!(soft >= 100.0 && normal < 50.0);
 }
 
+#[test]
+fn a_hard_attack_begins_louder_and_goes_on_as_any() {
+    let notes: Vec<u8> = NOTES.step_by(3).collect();
+    let levels = |attack: Attack| {
+        let settings = Settings { attack, noise: 0.0, ..still() };
+        each(notes.len(), |n| {
+            let out = rendered(&settings, &[controller(76), key(0.0, notes[n])], 1.5);
+            [0.03..0.1, 1.2..1.4].map(|part| level_db(&out[sample(part.start)..sample(part.end)]))
+        })
+    };
+    let [soft, normal, hard] = [Attack::Soft, Attack::Normal, Attack::Hard].map(levels);
+    let of = |at: usize, louder: &[[f64; 2]], than: &[[f64; 2]]| {
+        let steps: Vec<f64> = louder.iter().zip(than).map(|(a, b)| a[at] - b[at]).collect();
+        (quantile(steps.iter().copied(), 0.0), quantile(steps.iter().copied(), 1.0))
+    };
+    let (accent, bloom) = (of(0, &hard, &normal), of(0, &normal, &soft));
+    println!("hard over normal {accent:.1?} dB, normal over soft {bloom:.1?} dB");
+    assert!(accent.0 > 1.0 && bloom.0 > 1.0, "{accent:?} {bloom:?}");
+    for other in [soft, hard] {
+        let (least, most) = of(1, &other, &normal);
+        assert!(least > -0.3 && most < 0.3, "{least} to {most} dB once the note is held");
+    }
+}
+
+#[test]
+fn velocity_shapes_the_attack_of_a_note_that_a_controller_blows() {
+    let t90 = |velocity: f32| {
+        let on = Event::NoteOn { note: sounding(60), velocity };
+        let out = rendered(&still(), &[controller(76), (0.0, on)], 1.2);
+        1e3 * t90_s(&out, RATE_HZ, 0.0).unwrap()
+    };
+    let (gentle, quick) = (t90(0.1), t90(1.0));
+    println!("t90 {gentle:.1} ms at velocity 0.1, {quick:.1} at 1");
+    assert!(quick < 0.9 * gentle);
+}
+
 /// Amplitude at a frequency.
 fn line(samples: &[f64], hz: f64) -> f64 {
     let (mut re, mut im) = (0.0, 0.0);

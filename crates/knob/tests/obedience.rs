@@ -5,7 +5,7 @@
 use chalumeau_firmware::{Firmware, Reading, Setup};
 use chalumeau_knob::device::session::{HostSession, SessionOutput};
 use chalumeau_knob::device::transport::Binding;
-use chalumeau_knob::wire::{Feel, TorqueLaw};
+use chalumeau_knob::wire::{Feel, Message, TorqueLaw};
 use fastrand::Rng;
 use std::collections::VecDeque;
 
@@ -53,6 +53,8 @@ struct Play {
     beats: bool,
     /// The program runs.
     runs: bool,
+    /// The line loses every FREE.
+    loses_free: bool,
 }
 
 impl Play {
@@ -79,6 +81,7 @@ impl Play {
             torque_mnm: 0.0,
             beats: true,
             runs: true,
+            loses_free: false,
         };
         play.run(800);
         play.arm();
@@ -128,7 +131,8 @@ impl Play {
             self.session.poll(now_us, &mut send, &mut |_| {});
         }
         for bytes in said {
-            if self.rng.f64() >= self.lost {
+            let is_lost = self.rng.f64() < self.lost || self.loses_free && is_free(&bytes, self.is_midi);
+            if !is_lost {
                 self.to_knob.send(self.ms, self.late_ms, &bytes);
             }
         }
@@ -167,6 +171,13 @@ impl Play {
     }
 }
 
+/// Whether the host says FREE with these bytes.
+fn is_free(bytes: &[u8], is_midi: bool) -> bool {
+    // The type follows SysEx's header and the top bits of a group, or COBS's first count.
+    let kind = if is_midi { bytes.get(6) } else { bytes.iter().skip_while(|byte| **byte == 0).nth(1) };
+    kind == Some(&Message::Free.kind())
+}
+
 /// Breaks 1,000 plays, and gives the longest time to the last torque, ms.
 fn worst_ms(what: &str, binding: Binding, stop: impl Fn(&mut Play)) -> i64 {
     let mut worst = 0;
@@ -178,7 +189,7 @@ fn worst_ms(what: &str, binding: Binding, stop: impl Fn(&mut Play)) -> i64 {
         worst = worst.max(play.until_limp_ms());
         if seed % 50 == 0 {
             // Everybody is back: the knob is limp until the user acts, and then it works.
-            (play.runs, play.beats) = (true, true);
+            (play.runs, play.beats, play.loses_free) = (true, true, false);
             play.run(600);
             assert!(!play.firmware.is_armed(), "{what}: armed without an act");
             play.lost = 0.0;
@@ -204,6 +215,16 @@ fn a_host_that_stops_calling_ends_torque_within_650_ms() {
     for binding in BINDINGS {
         let worst = worst_ms("no beat", binding, |play| play.beats = false);
         assert!((500..=650).contains(&worst), "{worst} ms");
+    }
+}
+
+/// The figures of README and of the safety sheet.
+#[test]
+fn a_host_that_stops_calling_and_whose_free_is_lost_ends_torque_by_the_watchdog() {
+    for (binding, claimed_ms) in BINDINGS.into_iter().zip([630, 880]) {
+        let worst =
+            worst_ms("no beat, no FREE", binding, |play| (play.beats, play.loses_free) = (false, true));
+        assert!((600..=claimed_ms + 1).contains(&worst), "{worst} ms");
     }
 }
 

@@ -324,6 +324,9 @@ fn an_announced_zone_bends_by_48_semitones_and_its_manager_by_2() {
     assert_eq!(midi.bend(0, 0), [bend(FULL[0] - FULL[1])]);
     assert_eq!(midi.bend(4, 0), NOTHING, "another finger's wheel");
     assert_eq!(midi.bend(9, 0), NOTHING, "outside the zone");
+    // The manager's reset is its members', too.
+    assert_eq!(midi.controller(0, 121, 0)[0], bend(0.0));
+    midi.bend(0, 0);
     // The range of one member is that of all.
     for (cc, value) in [(101, 0), (100, 0), (6, 24)] {
         midi.controller(5, cc, value);

@@ -274,6 +274,78 @@ fn from_two_places_the_nearer_player_is_louder_and_the_first_is_as_alone() {
 }
 
 #[test]
+fn a_pan_moves_who_is_heard_from_two_places() {
+    let listening = Listening { mode: ListeningMode::Position, ..Listening::default() };
+    let still = Settings { life: 0.0, noise: 0.0, listening, ..Settings::default() };
+    let players = Players { count: 3, spread_cents: 0.0, width: 0.7, split: Split::Chords };
+    for (position, silent, heard) in [(1.0, 0, 1), (-1.0, 1, 0)] {
+        let mut section = Ensemble::built_in(RATE_HZ).unwrap();
+        section.set_settings(&Settings { players, ..still });
+        section.reset();
+        section.apply(to(1, Event::Pan { position }));
+        let sides = play(&mut section, &[Timed { at: 0, event: to(1, on(62)) }], 24_000, 512)
+            .map(|side| power(&side));
+        assert!(db(sides[heard] / sides[silent]) > 60.0, "{position}: {sides:?}");
+    }
+}
+
+#[test]
+fn a_pan_goes_on_where_one_becomes_several_and_where_another_ensemble_takes_over() {
+    let players = |count| Players { count, spread_cents: 0.0, width: 0.0, split: Split::Unison };
+    let settings = |count| Settings { life: 0.0, noise: 0.0, players: players(count), ..Settings::default() };
+    let right = |section: &mut Ensemble| {
+        let [left, right] = play(section, &[], 24_000, 512).map(|side| power(&side));
+        db(right / left)
+    };
+    let mut section = ensemble(players(1));
+    section.set_settings(&settings(1));
+    section.apply(Event::Pan { position: 0.5 }.into());
+    section.apply(on(62).into());
+    assert!(right(&mut section).abs() < 1e-6, "a lone player's pan belongs to who calls");
+    assert_eq!(section.pan(), 0.5);
+    section.set_settings(&settings(3));
+    right(&mut section);
+    let several = right(&mut section);
+    assert!(several > 3.0, "{several} dB");
+    let mut next = ensemble(players(3));
+    next.set_settings(&settings(3));
+    next.carry_on(&section);
+    let taken = right(&mut next);
+    assert!((taken - several).abs() < 0.1, "{taken} dB, {several} before");
+    next.set_settings(&settings(1));
+    assert_eq!(next.pan(), 0.5);
+}
+
+#[test]
+fn who_has_gone_and_still_sounds_is_silenced_by_panic() {
+    let mut section = ensemble(Players { count: 4, split: Split::Unison, ..Players::default() });
+    section.apply(on(62).into());
+    play(&mut section, &[], 24_000, 512);
+    section.set_settings(&Settings {
+        players: Players { count: 1, ..Players::default() },
+        ..Settings::default()
+    });
+    section.apply(Event::Panic.into());
+    let [left, _] = play(&mut section, &[], 4_800, 512);
+    assert!(db(power(&left[2_400..])) < -90.0, "{} dBFS", db(power(&left[2_400..])));
+}
+
+#[test]
+fn a_chord_is_of_players_who_are_heard_with_different_keys() {
+    let mut section = ensemble(Players { count: 3, ..Players::default() });
+    let mut after = |events: &[PartEvent]| {
+        events.iter().for_each(|event| section.apply(*event));
+        play(&mut section, &[], 24_000, 512);
+        section.plays_chord()
+    };
+    assert!(!after(&[to(0, on(62))]), "one is heard");
+    assert!(!after(&[to(1, on(62))]), "in unison");
+    assert!(after(&[to(2, on(69))]));
+    let gone = [to(2, off(69))];
+    assert!(!after(&gone) || !after(&[]) || !after(&[]), "who is silent again");
+}
+
+#[test]
 fn players_sit_side_by_side_with_constant_power() {
     let still = Settings { life: 0.0, noise: 0.0, ..Settings::default() };
     let players = Players { count: 3, spread_cents: 0.0, width: 1.0, split: Split::Chords };
