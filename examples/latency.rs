@@ -11,7 +11,6 @@
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::{Clarinet, Settings};
@@ -23,6 +22,7 @@ use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::Script;
 use chalumeau_knob::simulator::serve::{Port, Server};
+use chalumeau_knob::touch::angle::KnobDesign;
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 

@@ -4,7 +4,7 @@
 //! knows no host. Its order is the order in which hosts list the parameters. Ids live in saved projects and in automation
 //! lanes: entries are only ever added, at the end of their group, and an id never changes.
 
-mod spelling;
+pub mod spelling;
 mod table;
 mod text;
 

@@ -41,10 +41,8 @@ use nice_plug::context::gui::AsyncExecutor;
 use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
+pub use params::ChalumeauParams;
 pub use params::instrument::InstrumentChoice;
-pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, KnobParams, NoiseParams};
-pub use params::{InstrumentParams, OutputParams, PhysicalReedParams, ReedParams};
-pub use params::{SCHEMA, TuningChoice, TuningParams};
 
 use crate::controllers::breath_input::BreathInput;
 use crate::identity;

@@ -192,20 +192,10 @@ pub fn find<'a>(name: &str, user: &'a UserPresets) -> Result<&'a Preset, String>
         if let Some(broken) = user.broken_called(name) {
             return format!("the preset {name:?} cannot be read: {broken}");
         }
-        let near = nearest(name, all().map(|preset| preset.name.as_str()));
+        let near = parameters::spelling::nearest(name, all().map(|preset| preset.name.as_str()));
         let meant = near.map_or_else(String::new, |near| format!(" did you mean {near:?}?"));
         format!("there is no preset {name:?};{meant} `chalumeau presets list` lists them all")
     })
-}
-
-/// The name that was most likely meant by `typed`; `None` if none is near.
-pub fn nearest<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let typed = typed.to_lowercase();
-    // What begins alike is near, however long it is.
-    let nearness = |name: &str| strsim::jaro_winkler(&typed, &name.to_lowercase());
-    let near = names.into_iter().map(|name| (nearness(name), name));
-    // Below this, names of different words begin to look alike.
-    near.filter(|(near, _)| *near > 0.75).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
 }
 
 /// A name as presets have it: without white space at its ends; refused if it is empty, too long or holds a line break.
@@ -328,14 +318,6 @@ mod tests {
         for (search, found) in [("", true), ("NIGHT lip", true), ("jazz club", true), ("jazz bass", false)] {
             assert_eq!(preset.is_found_by(search), found, "{search}");
         }
-    }
-
-    #[test]
-    fn a_mistyped_name_is_near_and_another_word_is_not() {
-        let names = ["Soft subtone", "Klezmer dance", "Deep bass"];
-        assert_eq!(nearest("soft subtown", names), Some("Soft subtone"));
-        assert_eq!(nearest("klezmer", names), Some("Klezmer dance"));
-        assert_eq!(nearest("xyzzy", names), None);
     }
 
     #[test]

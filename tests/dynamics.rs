@@ -7,7 +7,6 @@ use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::steady_segment;
 use chalumeau_core::analysis::steady_note::SteadyNote;
-use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
@@ -18,6 +17,7 @@ use chalumeau_core::measure::realism::{
 use chalumeau_core::parallel;
 use chalumeau_core::score::{Score, play};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
+use chalumeau_knob::touch::angle::KnobDesign;
 use chalumeau_knob::touch::breath_from_angle::{Blower, BreathMapping};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use std::convert::Infallible;

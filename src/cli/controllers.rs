@@ -3,8 +3,8 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
 use crate::controllers::{ControllerMap, factory};
+use crate::parameters::spelling::nearest;
 use crate::parameters::{Parameter, Sets, Value};
-use crate::presets::nearest;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::techniques::Wheel;

@@ -10,7 +10,6 @@ use crate::identity::VERSION;
 use crate::output::{NewFile, OutputError, remove_unfinished_and_exit};
 use crate::take_file::TakeFile;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::haptics::{FeelDesign, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
@@ -18,6 +17,7 @@ use chalumeau_knob::device::{
     FIRST_CEILING_MNM, HARD_CEILING_MNM, Hooks, KnobChoice, KnobLink, LinkStats, LinkStatus,
     OFFERED_CEILING_MNM, Phase, Release, StateSample, serial_text,
 };
+use chalumeau_knob::touch::angle::KnobDesign;
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::{TakeEmbouchure, TakeHand, TakeHead, TakeMarks, TakeRow};
 use chalumeau_knob::wire::Info;

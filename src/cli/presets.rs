@@ -2,8 +2,9 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
+use crate::parameters::spelling::nearest;
 use crate::presets::user_folder::UserPresets;
-use crate::presets::{self, Preset, factory, nearest};
+use crate::presets::{self, Preset, factory};
 use clap::{Args, Subcommand};
 use std::collections::BTreeSet;
 use std::io::Write;

@@ -7,7 +7,6 @@ use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use chalumeau_core::instrument::Settings;
-use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
 use chalumeau_core::units::{Air, WrittenNote};
 use chalumeau_figure::threshold::{self, Strength, Thresholds};
@@ -112,9 +111,7 @@ impl ThresholdCommand {
 /// Gamma at which the linear theory lets the note begin; `None` where no impedance peak carries it.
 pub fn linear_threshold(file: &InstrumentFile, written: WrittenNote, settings: &Settings) -> Option<f64> {
     // Flow strength of the reed as strength, lip and H, k, A make it: what the linear theory asks for.
-    let law = settings.reed_law();
-    let opening = law.a() * law.h() / ReedLaw::default().h();
-    let zeta = f64::from(settings.zeta) * opening / law.closing().sqrt();
+    let zeta = settings.reed_law().flow_strength(f64::from(settings.zeta));
     let fingering = file.fingering(written)?;
     let model = TransferMatrix::new(file, Air::at(f64::from(settings.temperature_c)));
     let near_hz = written.sounding(file.transposition)?.frequency_hz(f64::from(settings.a4_hz));

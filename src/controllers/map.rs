@@ -23,8 +23,8 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::parameters::spelling::nearest;
 use crate::parameters::{self, Kind, PARAMETERS, Parameter, Sets, Value};
-use crate::presets::nearest;
 use chalumeau_core::control::midi::links::{Link, MOST, Source, Target};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::units::clamped_or;

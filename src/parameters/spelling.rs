@@ -76,6 +76,16 @@ fn words(name: &str) -> Vec<String> {
         .collect()
 }
 
+/// The name that was most likely meant by `typed`; `None` if none is near.
+pub fn nearest<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let typed = typed.to_lowercase();
+    // What begins alike is near, however long it is.
+    let nearness = |name: &str| strsim::jaro_winkler(&typed, &name.to_lowercase());
+    let near = names.into_iter().map(|name| (nearness(name), name));
+    // Below this, names of different words begin to look alike.
+    near.filter(|(near, _)| *near > 0.75).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,5 +124,13 @@ mod tests {
         assert_eq!(canonical(" -- "), "");
         assert!(begins_with("Bass clarinet", "bass") && begins_with("B flat clarinet", "bflat"));
         assert!(!begins_with("CC74 (MPE y)", "cc7") && !begins_with("Bass clarinet", "clarinet"));
+    }
+
+    #[test]
+    fn a_mistyped_name_is_near_and_another_word_is_not() {
+        let names = ["Soft subtone", "Klezmer dance", "Deep bass"];
+        assert_eq!(nearest("soft subtown", names), Some("Soft subtone"));
+        assert_eq!(nearest("klezmer", names), Some("Klezmer dance"));
+        assert_eq!(nearest("xyzzy", names), None);
     }
 }

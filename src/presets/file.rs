@@ -8,7 +8,8 @@ use std::fmt::Write as _;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{Preset, checked_name, nearest};
+use super::{Preset, checked_name};
+use crate::parameters::spelling::nearest;
 use crate::parameters::{self, Parameter};
 
 /// Layout of the text. A program reads its own and earlier ones.

@@ -1,7 +1,6 @@
 //! A player at a knob, whole: hand, knob, firmware, wire, host, breath, clarinet. Everything is what a user runs, but for
 //! the port between the two and the clock: time is simulated.
 
-use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Model, Probe, Settings};
 use chalumeau_core::units::SoundingNote;
@@ -12,6 +11,7 @@ use chalumeau_knob::device::transport::Binding;
 use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::{PERIOD_US, SimulatedKnob};
 use chalumeau_knob::simulator::plant::PlantDesign;
+use chalumeau_knob::touch::angle::KnobDesign;
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::PitchMaps;
 use chalumeau_knob::wire::Feel;

@@ -16,10 +16,10 @@ use chalumeau_core::instrument::{BuildError, Channels, Ensemble, Preparation, Se
 use chalumeau_core::maths;
 
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::control::knob::{KnobDesign, slap_strength};
 use chalumeau_core::event::{Played, To};
 use chalumeau_core::instrument::Model;
 use chalumeau_core::instrument::prepare::PreparedInstrument;
+use chalumeau_knob::touch::angle::{KnobDesign, slap_strength};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
 
 use crate::held_knob::HeldKnob;

@@ -3,7 +3,6 @@
 pub mod bends;
 pub mod key_switches;
 pub mod keys;
-pub mod knob;
 pub mod midi;
 pub mod notes;
 pub mod parts;

@@ -10,7 +10,7 @@
 //! | [`reed`] | the law of the reed, its tables, and the moving reed |
 //! | [`bore`] | instrument files, transfer matrices, and the waveguide lattice fitted to them |
 //! | [`dsp`] | resampler and limiter |
-//! | [`control`] | from MIDI, knob readings and wind at a microphone to events |
+//! | [`control`] | from MIDI and wind at a microphone to events |
 //! | [`score`] | what to play: notes, scales, breath curves, MIDI files; offline rendering |
 //! | [`measure`] | measurements of played notes: pitch and level, bifurcation diagram, one period of the reed |
 //! | [`analysis`] | methods for samples: pitch, spectrum, onset, impedance |

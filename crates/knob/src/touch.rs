@@ -2,6 +2,7 @@
 //!
 //! This module joins the instrument's settings with the feel. Plugin and command line both play through it.
 
+pub mod angle;
 pub mod breath_from_angle;
 pub mod feel;
 pub mod heard;

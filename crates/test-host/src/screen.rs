@@ -115,11 +115,6 @@ impl Screen {
         self.wait(&format!("a window called {title}"), || Ok(self.find(self.root, title)))
     }
 
-    /// Whether no window of that title is left.
-    pub fn has_none(&self, title: &str) -> bool {
-        self.find(self.root, title).is_none()
-    }
-
     fn find(&self, within: Window, title: &str) -> Option<Window> {
         let children = self.connection.query_tree(within).ok()?.reply().ok()?.children;
         let named = |&child: &Window| self.is_shown(child) && self.title(child).as_deref() == Some(title);

@@ -10,11 +10,11 @@ use std::time::Duration;
 
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
-use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::{SoundingNote, cents};
+use chalumeau_knob::touch::angle::KnobDesign;
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;

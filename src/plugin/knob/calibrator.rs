@@ -5,8 +5,8 @@ use std::time::Instant;
 use super::feel_design::knob_design;
 use crate::plugin::params::KnobParams;
 use crate::plugin::params::knob::SavedCalibration;
-use chalumeau_core::control::knob::{self, KnobDesign, Taken};
 use chalumeau_knob::device::{KnobLink, LinkStatus};
+use chalumeau_knob::touch::angle::{self, KnobDesign, Taken};
 
 /// When it was made, us on any clock, and the angle, degrees.
 pub type Reading = (u64, f64);
@@ -25,7 +25,7 @@ struct Awaited {
 
 /// The measurement of *Rest here* or *Blow hard here*.
 pub struct Calibrator {
-    measurement: knob::Calibration,
+    measurement: angle::Calibration,
     began: Instant,
     /// From the clock of the readings to the time since `began`, s: the least that was seen, so that readings that come late, many
     /// at once, keep the times at which they were made.
@@ -37,7 +37,7 @@ pub struct Calibrator {
 impl Calibrator {
     pub(super) fn new() -> Self {
         Self {
-            measurement: knob::Calibration::default(),
+            measurement: angle::Calibration::default(),
             began: Instant::now(),
             lead_s: f64::INFINITY,
             latest_s: 0.0,

@@ -2,9 +2,9 @@
 
 use crate::plugin::params::KnobParams;
 use crate::plugin::params::knob::{LawChoice, OrderChoice, SavedCalibration};
-use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::haptics::{FeelDesign, NoteOrder};
 use chalumeau_core::units::WrittenNote;
+use chalumeau_knob::touch::angle::KnobDesign;
 use chalumeau_knob::wire::TorqueLaw;
 
 /// Highest torque of the reference note in a study, mNm. With it, both sides of every trial stay under the first ceiling

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::entry::{choice, number, status, switch, whole};
 use super::moment::{self, Moment, Moments};
-use chalumeau_core::control::knob::{KnobDesign, TRAVEL_DEG};
+use chalumeau_core::haptics::FeelDesign;
+use chalumeau_knob::touch::angle::KnobDesign;
 use chalumeau_knob::touch::study::{StudySide, Trial, plan};
 
 /// Which kind of device.
@@ -114,7 +115,12 @@ impl SavedCalibration {
         let dead_on = fix(self.dead_deg.0, 0.1, 30.0, d.dead_deg.0);
         Self {
             rest_deg: fix(self.rest_deg, -36_000.0, 36_000.0, 0.0),
-            travel_deg: fix(self.travel_deg, TRAVEL_DEG.0, TRAVEL_DEG.1, d.travel_deg),
+            travel_deg: fix(
+                self.travel_deg,
+                FeelDesign::TRAVEL_DEG.0,
+                FeelDesign::TRAVEL_DEG.1,
+                d.travel_deg,
+            ),
             dead_deg: (dead_on, fix(self.dead_deg.1, 0.0, 0.9 * dead_on, 0.5 * dead_on)),
         }
     }

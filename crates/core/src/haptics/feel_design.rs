@@ -1,6 +1,5 @@
 //! How a clarinet shall feel: the choices of the user, with their ranges and defaults.
 
-use crate::control::knob::TRAVEL_DEG;
 use crate::haptics::feel_parameters::{HARD_CEILING_MNM, TorqueLaw};
 use crate::haptics::feel_refused::FeelRefused;
 use crate::units::WrittenNote;
@@ -93,7 +92,7 @@ impl FeelDesign {
     /// Range of the strength, mNm: up to what any knob may make.
     pub const STRENGTH_MNM: (f64, f64) = (0.0, HARD_CEILING_MNM as f64);
     /// Range of the angle of closure, degrees.
-    pub const TRAVEL_DEG: (f64, f64) = TRAVEL_DEG;
+    pub const TRAVEL_DEG: (f64, f64) = (120.0, 1_080.0);
     /// Range of the mark's height, mNm.
     pub const MARK_MNM: (f64, f64) = (0.0, 100.0);
 

@@ -15,7 +15,7 @@ pub struct RuntimeDir {
 
 impl Default for RuntimeDir {
     fn default() -> Self {
-        let chosen = std::env::var_os(VARIABLE).map(PathBuf::from);
+        let chosen = std::env::var_os(VARIABLE).filter(|chosen| !chosen.is_empty()).map(PathBuf::from);
         let root = chosen.or_else(dirs::runtime_dir).unwrap_or_else(std::env::temp_dir);
         Self::within(root)
     }

@@ -6,10 +6,10 @@
 
 mod carry;
 
+use crate::touch::angle::{KnobBreath, KnobDesign};
 use crate::touch::breath_from_angle::carry::Carry;
 use crate::touch::feel::PitchMaps;
 use chalumeau_core::control::keys::Keys;
-use chalumeau_core::control::knob::{KnobBreath, KnobDesign};
 use chalumeau_core::event::{Event, Played, Timed};
 use chalumeau_core::instrument::KeyNotes;
 use chalumeau_core::units::SoundingNote;

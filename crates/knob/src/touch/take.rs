@@ -1,11 +1,11 @@
 //! Takes: what a hand did on a knob, to be replayed and analysed. [`take_csv`](crate::touch::take_csv) reads and writes
 //! them.
 
+use crate::touch::angle::KnobDesign;
 use crate::touch::breath_from_angle::BreathMapping;
 use crate::touch::feel::PitchMaps;
 use crate::touch::heard::Heard;
 use crate::touch::study::{Condition, StudySide};
-use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::instrument::Settings;
 
 /// One row of a take: one moment.

@@ -4,9 +4,9 @@
 //! place; the other columns may be missing or empty. Unknown columns are ignored. Time may start anywhere but must not
 //! go back; a replay starts at the first row. Above the columns, comments say what was played and felt ([`TakeHead`]).
 
+use crate::touch::angle::KnobDesign;
 use crate::touch::study::StudySide;
 use crate::touch::take::{Take, TakeEmbouchure, TakeHand, TakeHead, TakeMarks, TakeRow};
-use chalumeau_core::control::knob::KnobDesign;
 use std::io::{self, BufRead, BufReader, Read, Write};
 
 /// Column names in the order they are written.

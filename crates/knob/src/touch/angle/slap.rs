@@ -1,6 +1,6 @@
 //! Strength of a tongue slap that a knob reports. The link to the knob detects each slap once.
 
-use crate::units::clamped_or;
+use chalumeau_core::units::clamped_or;
 
 /// Speed of the hardest slap, rad/s: what a knob may turn at before it is switched off.
 const FULL_SPEED_RAD_S: f32 = 60.0;

@@ -4,8 +4,10 @@
 //! of the readings, so nothing here waits or asks a clock. The thresholds are by judgement, for a knob that reads in
 //! steps of 0.1 degrees and a hand whose tremor moves it by half a degree.
 
-use crate::control::knob::{KnobDesign, TRAVEL_DEG};
-use crate::maths;
+use chalumeau_core::haptics::FeelDesign;
+
+use crate::touch::angle::KnobDesign;
+use chalumeau_core::maths;
 
 /// How long *Rest* listens, s.
 pub const REST_S: f64 = 1.0;
@@ -81,7 +83,7 @@ pub enum CalibrationError {
     #[error(
         "the knob went {travel_deg:.0} degrees from its rest; full blow may lie at most {:.0} degrees away: press Blow \
          hard again and turn it less far",
-        TRAVEL_DEG.1
+        FeelDesign::TRAVEL_DEG.1
     )]
     TooFar {
         /// From rest, degrees.
@@ -215,7 +217,7 @@ impl Collecting {
             }
             Step::Blow { zero_deg } => {
                 let travel_deg = self.furthest_held_deg - zero_deg;
-                let (least_deg, furthest_deg) = TRAVEL_DEG;
+                let (least_deg, furthest_deg) = FeelDesign::TRAVEL_DEG;
                 if travel_deg < least_deg {
                     return Err(CalibrationError::TooLittleTravel { travel_deg, least_deg });
                 }
@@ -231,7 +233,7 @@ impl Collecting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::knob::KnobBreath;
+    use crate::touch::angle::KnobBreath;
 
     /// Feeds `angle` of time at `hz` until there is an outcome.
     fn run(

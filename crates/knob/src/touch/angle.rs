@@ -1,18 +1,18 @@
 //! Turns the angle of the knob into breath: rest, dead zone, curve, and full blow.
 //!
 //! Angles are degrees since the device's zero, positive is blowing, and may be any number of turns. This
-//! module does not depend on the note or on the torque; `haptics` adapts the result for knobs with a motor.
+//! module does not depend on the note or on the torque; `breath_from_angle` adapts the result for knobs with a motor.
 //!
 //! ```
-//! use chalumeau_core::control::knob::{KnobBreath, KnobDesign};
+//! use chalumeau_knob::touch::angle::{KnobBreath, KnobDesign};
 //!
 //! // One turn from rest to full blow, with a dead zone of 0.5 to 1 degree.
 //! let mut knob = KnobBreath::new(KnobDesign::default())?;
 //! assert_eq!([0.4, 360.0].map(|angle_deg| knob.pressure_unit(angle_deg)), [0.0, 1.0]);
-//! # Ok::<(), chalumeau_core::control::knob::KnobError>(())
+//! # Ok::<(), chalumeau_knob::touch::angle::KnobError>(())
 //! ```
 
-use crate::maths;
+use chalumeau_core::maths;
 
 pub mod calibration;
 pub mod slap;
@@ -24,8 +24,6 @@ pub use slap::slap_strength;
 pub const CURVE: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 /// Least way from the end of the dead zone to full blow, degrees: less is fewer than a hundred steps of 0.1 degrees.
 pub const LEAST_TRAVEL_DEG: f64 = 10.0;
-/// From rest to full blow, degrees: what a hand can turn comfortably, by judgement.
-pub const TRAVEL_DEG: (f64, f64) = (120.0, 1_080.0);
 
 /// How the knob is blown with: what a player sets or calibrates.
 #[derive(Clone, Copy, Debug, PartialEq)]
