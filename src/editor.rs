@@ -79,6 +79,7 @@ use preset_browser::PresetBrowser;
 use trial::Trial;
 use undo::UndoHistory;
 
+use crate::folder_listing::Place;
 use crate::presets::Preset;
 
 /// What the user did, other than changing a parameter.
@@ -121,6 +122,8 @@ pub enum Action {
     ChooseInstrument(usize),
     /// An instrument file.
     OpenInstrument(PathBuf),
+    /// The file that *User file* stands for, as undo brings it back; empty for the usual place.
+    NameInstrumentFile(String),
     /// A scale or a keyboard mapping.
     OpenScale(PathBuf),
     /// Keys play equal temperament again.
@@ -129,8 +132,8 @@ pub enum Action {
     TrimNotes(BTreeMap<u8, i16>),
     /// Keys without a scale of their own follow a tuning program, or no longer.
     FollowTuningProgram(bool),
-    /// Read a folder for the user to choose from; `None` is the user's own.
-    ReadFolder(Option<PathBuf>),
+    /// Read a folder for the user to choose from.
+    ReadFolder(Place),
     /// The preset of this name has been put on the controls.
     ChosePreset(String),
     /// Look again for the user's presets.
@@ -335,7 +338,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     trial.keep_to(snapshot, &mut actions);
     // A window that has grown past the screen hides the list of sizes.
     if keyboard.has_letters()
-        && ui.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Num0))
+        && ui.input_mut(|input| input.consume_key(egui::Modifiers::COMMAND, egui::Key::Num0))
     {
         kept.zoom = 1.0;
     }
@@ -416,6 +419,11 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             }
         }
     });
+    for action in &actions {
+        if let Action::OpenInstrument(path) = action {
+            hands.record_instrument_file(path, snapshot);
+        }
+    }
     if let Some(moved) = clarinet.alterations().take_move() {
         hands.history.record_move(moved);
     }

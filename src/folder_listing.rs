@@ -6,6 +6,18 @@ use std::path::{Path, PathBuf};
 /// Most entries that are listed.
 pub const ENTRIES_MOST: usize = 5_000;
 
+/// Where a user looks for files.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Place {
+    /// The user's own folder.
+    #[default]
+    Home,
+    /// The folder in which the program saves instruments; where there is none yet, the user's own.
+    Instruments,
+    /// This one.
+    Folder(PathBuf),
+}
+
 /// The content of a folder by name, without what is hidden.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FolderListing {

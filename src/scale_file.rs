@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use tune::key::PianoKey;
 use tune::note::Note;
-use tune::pitch::Pitched;
+use tune::pitch::{Pitch, Pitched};
 use tune::scala::{
-    Kbm, KbmBuildError, KbmImportError, KbmParseErrorKind, KbmStructuralError, Scl, SclBuildError,
+    Kbm, KbmBuildError, KbmImportError, KbmParseErrorKind, KbmRoot, KbmStructuralError, Scl, SclBuildError,
     SclImportError, SclParseErrorKind, SclStructuralError,
 };
 use tune::tuning::KeyboardMapping;
@@ -91,7 +91,7 @@ pub fn key_pitches(scl: &str, kbm: Option<&str>) -> Result<KeyPitches, ScaleFaul
             let mapping =
                 Kbm::import(text.as_bytes()).map_err(|error| of_mapping(kbm_error(&error, text)))?;
             check_mapping(text).map_err(of_mapping)?;
-            mapping
+            rooted(mapping, text, &scale).map_err(of_mapping)?
         }
         None => Kbm::builder(Note::from_midi_number(FIRST_KEY))
             .build()
@@ -205,6 +205,38 @@ fn check_mapping(kbm: &str) -> Result<(), String> {
     Ok(())
 }
 
+/// A mapping whose degrees count from its middle key, where its first entry is, and whose reference key has its frequency. The reader of
+/// the format counts them from the reference key.
+fn rooted(mut mapping: Kbm, kbm: &str, scale: &Scl) -> Result<Kbm, String> {
+    let all: Vec<_> = entries(kbm).collect();
+    let [size, _, _, middle, reference, hz, octave, degrees @ ..] = all.as_slice() else {
+        return Ok(mapping);
+    };
+    let whole = |entry: &(usize, &str)| entry.1.parse::<i32>().unwrap_or_default();
+    let steps = whole(reference) - whole(middle);
+    let degree = match whole(size) {
+        ..=0 => Some(steps),
+        size => {
+            let entry = degrees.get(steps.rem_euclid(size) as usize);
+            let degree = entry.and_then(|(_, degree)| degree.parse::<i32>().ok());
+            degree.map(|degree| degree + steps.div_euclid(size) * whole(octave))
+        }
+    };
+    let Some(degree) = degree else {
+        return Err(format!(
+            "line {} is the reference key, {}, and the map gives that key no pitch",
+            reference.0, reference.1
+        ));
+    };
+    let reference_hz = hz.1.parse().unwrap_or(f64::NAN);
+    mapping.root = KbmRoot {
+        ref_key: PianoKey::from_midi_number(whole(middle)),
+        ref_pitch: Pitch::from_hz(reference_hz / scale.relative_pitch_of(degree).as_float()),
+        root_offset: 0,
+    };
+    Ok(mapping)
+}
+
 /// The text of a file of a scale. Scala's archive is in Latin-1; only comments and names have letters beyond ASCII.
 pub fn text(path: &Path) -> Result<String, ScaleError> {
     let refused = |source| ScaleError::Read { path: path.to_owned(), source };
@@ -221,7 +253,7 @@ fn scl_error(error: &SclImportError, text: &str) -> String {
         SclImportError::IoError(error) => error.to_string(),
         SclImportError::ParseError { line_number, kind } => {
             let what = match kind {
-                SclParseErrorKind::IntValue => "must be a whole number",
+                SclParseErrorKind::IntValue => "must be a whole number from 0 to 65535",
                 SclParseErrorKind::CentsValue => "must be cents with a point, such as 701.955",
                 SclParseErrorKind::Numer | SclParseErrorKind::Denom => "must be a ratio, such as 3/2",
             };
@@ -245,7 +277,9 @@ fn kbm_error(error: &KbmImportError, text: &str) -> String {
         KbmImportError::IoError(error) => error.to_string(),
         KbmImportError::ParseError { line_number, kind } => {
             let what = match kind {
-                KbmParseErrorKind::IntValue => "must be a whole number",
+                KbmParseErrorKind::IntValue => {
+                    "must be a whole number: the size of the map from 0 to 65535, a key or a degree"
+                }
                 KbmParseErrorKind::FloatValue => "must be a frequency in Hz, such as 440.0",
                 KbmParseErrorKind::KeyboardMapping => {
                     "must be a degree of the scale, or x for a key without a pitch"

@@ -1,6 +1,8 @@
 //! Writes WAV files: 16 or 24 bit integers, rounded to nearest without dither, or unchanged 32 bit floats. Reads those of
 //! others.
 
+mod riff;
+
 use hound::{SampleFormat, WavSpec, WavWriter};
 use std::io::{BufWriter, Seek, Write};
 use std::ops::Range;
@@ -220,7 +222,7 @@ impl From<hound::Error> for Unreadable {
 /// Reads one channel (counted from 1), or the mean of all, from one time to another, s: integers of 8, 16, 24 or 32 bits, or floats
 /// of 32.
 pub fn read(path: &Path, channel: Option<u16>, from_s: f64, to_s: f64) -> Result<Recording, Unreadable> {
-    let mut reader = hound::WavReader::open(path)?;
+    let mut reader = riff::open(path)?;
     let WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format } = reader.spec();
     if rate < 1_000 {
         return Err(Unreadable::Rate(rate));

@@ -104,7 +104,19 @@ fn cases() -> Vec<Case> {
         }),
         ..equal("seven equal, white keys, A at 432", 7, 1_200.0)
     };
+    // Scala's usual mapping: the map begins at middle C, and the reference key is A. A size of 0 is a map of all keys.
+    let usual = "! usual.kbm\n12\n0\n127\n60\n69\n440.0\n12\n0\n1\n2\n3\n4\n5\n6\n7\n8\n9\n10\n11\n";
+    let all_keys = "0\n0\n127\n60\n69\n440.0\n12\n";
+    let from_a = |name: &'static str, of: Case, kbm: &'static str| {
+        let over_a = 440.0 / (of.hz)(69).unwrap();
+        let hz = of.hz;
+        Case { name, kbm: Some(kbm), hz: Box::new(move |key| Some(over_a * hz(key)?)), scl: of.scl }
+    };
     vec![
+        from_a("just, usual mapping", by_ratios("just", just), usual),
+        from_a("just, all keys", by_ratios("just", just), all_keys),
+        from_a("twelve equal, usual mapping", equal("twelve equal", 12, 1_200.0), usual),
+        from_a("stretched octaves from A", equal("stretched octaves", 12, 1_210.0), usual),
         by_cents("quarter-comma meantone", meantone(&[7, 2, -3, 4, -1, 6, 1, 8, 3, -2, 5])),
         by_cents("Pythagorean", {
             let fifth = 1_200.0 * 1.5_f64.log2();
@@ -185,7 +197,7 @@ fn every_key_sounds_where_its_scale_says() {
         assert!(off.abs() <= 0.5, "{what} ({hz:.2} Hz): {off:+.2} cents");
         worst = worst.max(off.abs());
     }
-    println!("{} keys of ten scales within {worst:.2} cents", asked.len());
+    println!("{} keys of fourteen scales within {worst:.2} cents", asked.len());
 }
 
 #[test]
@@ -194,11 +206,12 @@ fn damaged_files_are_told_with_their_line() {
     for (scl, kbm, says) in [
         ("", None, "it is empty"),
         ("name\n", None, "the number of notes"),
-        ("name\ntwelve\n", None, "line 2 must be a whole number, got \"twelve\""),
+        ("name\ntwelve\n", None, "line 2 must be a whole number from 0 to 65535, got \"twelve\""),
         ("name\n2\n100.0\n", None, "not as many pitches"),
         ("name\n2\n100.0\n3/x\n", None, "line 4 must be a ratio"),
         ("name\n1\n1200.0.0\n", None, "line 3 must be cents"),
         ("name\n1\n2/1\n", Some("12\n0\n"), "it ends before the last key"),
+        ("name\n1\n2/1\n", Some("-3\n0\n"), "line 1 must be a whole number: the size of the map from 0"),
         ("name\n1\n2/1\n", Some("12\n0\n127\n60\n69\nA4\n12\n"), "line 6 must be a frequency"),
         ("name\n1\n2/1\n", Some("2\n0\n127\n60\n69\n440.0\n12\n0\nQ\n"), "line 9 must be a degree"),
     ] {
@@ -226,6 +239,10 @@ fn damaged_files_are_told_with_their_line() {
         ("2\n0\n127\n60\n69\n440.0\n1\nx\nX\n", "line 9 is \"X\", as are all entries"),
         ("12\n0\n127\n60\n69\n440.0\n12\n", "no entries follow"),
         ("0\n-20\n-10\n60\n69\n440.0\n12\n", "no key has a pitch"),
+        (
+            "2\n0\n127\n60\n69\n440.0\n1\n0\nx\n",
+            "line 5 is the reference key, 69, and the map gives that key no pitch",
+        ),
     ] {
         let said = read(b"name\n1\n2/1\n", Some(mapping)).expect_err(mapping);
         assert!(said.contains(says), "{said}");

@@ -150,8 +150,9 @@ impl BatchCommand {
                 self.into.display()
             )));
         }
-        fs::create_dir_all(&self.into)
-            .map_err(|error| self.failure(&format!("cannot make {}: {error}", self.into.display())))?;
+        fs::create_dir_all(&self.into).map_err(|error| {
+            Failure::Usage(format!("cannot make the folder {}: {error}", self.into.display()))
+        })?;
         let header = format!("file,{},length_s,rate_hz,peak_dbfs,rms_dbfs,warnings", plan.names.join(","));
         let earlier = Earlier::read(&self.into)?;
         if !self.force {
@@ -212,6 +213,10 @@ impl BatchCommand {
 
     /// Refuses a folder that cannot be meant, and a plan that the tables in the folder would replace.
     fn refuse_names(&self) -> Result<(), Failure> {
+        if self.into == Path::new("-") {
+            let usage = "a batch cannot go to standard output; give --into the name of a folder";
+            return Err(Failure::Usage(usage.to_owned()));
+        }
         if self.into.to_str().is_none() {
             return Err(Failure::Usage(format!(
                 "--into {}: the name of the folder is not in UTF-8, in which the commands of a batch are; give another name",

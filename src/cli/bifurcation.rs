@@ -125,6 +125,9 @@ impl BifurcationCommand {
                 begins: changes.begins,
                 shuts: changes.shuts,
                 chokes: changes.chokes,
+                gives_way: found.other_register().is_some_and(|(way, gamma)| {
+                    way > 0 && changes.chokes.is_none_or(|chokes| gamma <= chokes + NEAR)
+                }),
                 returns: changes.returns,
                 ends: changes.ends,
             }
@@ -132,6 +135,9 @@ impl BifurcationCommand {
         })
     }
 }
+
+/// Where a note ends and another register is heard, these are one place: the points of a ramp are so far apart, gamma.
+const NEAR: f64 = 0.02;
 
 /// Refuses a note whose key stays silent: a table of zeros would look as if it had been measured.
 pub(super) fn refuse_silent(

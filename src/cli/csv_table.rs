@@ -152,7 +152,15 @@ pub fn quoted(text: &str) -> Cow<'_, str> {
 
 /// A number with so many decimals, or nan.
 pub fn number(x: f64, decimals: usize) -> String {
-    if x.is_finite() { format!("{x:.decimals$}") } else { "nan".to_owned() }
+    if !x.is_finite() {
+        return "nan".to_owned();
+    }
+    let text = format!("{x:.decimals$}");
+    // What rounds to 0 has no sign.
+    match text.strip_prefix('-') {
+        Some(bare) if bare.bytes().all(|byte| matches!(byte, b'0' | b'.')) => bare.to_owned(),
+        _ => text,
+    }
 }
 
 /// The name of a note as a field of a table: C#4 is quoted.

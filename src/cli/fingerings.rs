@@ -29,7 +29,8 @@ Examples:
 ///
 /// Columns of a note:
 /// fingers: keys and holes that the hands press, T thumb, L left, R right; empty where only the chart knows how;
-/// hz, cents: where it sounds, and how far that is from the note;
+/// hz, cents: its resonance with the air that moves with the reed, and how far that is from the note. A played note lies some 20 to 60
+/// cents lower; the difference from the fingering of the chart is what one hears;
 /// gamma_on: the mouth pressure at which it begins, over the closing pressure of the reed;
 /// mode: which peak of the impedance it plays, 1 the lowest, as in an instrument file;
 /// evenness_db: how far that resonance stands above the next lower one, 6 at most; below 0 the lower one may sound instead;
@@ -98,7 +99,12 @@ impl FingeringsCommand {
             );
         }
         say_contrary(&file);
-        let looked = format!("{}; {} looked through", file.name, counted(finder.len(), "fingering"));
+        let looked = format!(
+            "{}; {} looked through; {:.1} C",
+            file.name,
+            counted(finder.len(), "fingering"),
+            self.air.air().temperature_c
+        );
         let Some(note) = self.note.map(WrittenNote) else {
             let mut table = self.table.open("fingers,low_hz,high_hz,uneven_db,gamma_on,cost,open")?;
             table.comment(format_args!("{looked}"))?;

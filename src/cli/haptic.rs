@@ -182,9 +182,10 @@ impl HapticCommand {
             "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg,most_mnm",
         )?;
         table.comment(format_args!(
-            "{}; {}, {} about {}",
+            "{}; {}; {:.1} C, {} about {}",
             file.name,
             self.felt.played.reed.in_words(),
+            self.felt.played.air.air().temperature_c,
             self.felt.feel.exaggeration(),
             feel.reference().written
         ))?;

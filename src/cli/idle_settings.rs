@@ -3,6 +3,7 @@
 use crate::cli::settings::SettingsArgs;
 use crate::cli::{Failure, score_args::BreathSource};
 use chalumeau_core::instrument::listening::ListeningMode;
+use chalumeau_core::instrument::techniques::GrowlPitch;
 use chalumeau_core::instrument::{BreathResponse, Settings};
 
 /// A setting that was given and has no effect.
@@ -24,7 +25,7 @@ struct Need {
     why: &'static str,
 }
 
-const NEEDS: [Need; 11] = [
+const NEEDS: [Need; 13] = [
     Need {
         ids: &["bcurve", "bsoft", "bloud"],
         is_met: |settings, _| settings.breath_response == BreathResponse::Played,
@@ -50,6 +51,18 @@ const NEEDS: [Need; 11] = [
         is_met: |settings, _| settings.techniques.growl > 0.0,
         may_be_played: true,
         why: "is for a growl, and there is none; add --growl",
+    },
+    Need {
+        ids: &["growlf"],
+        is_met: |settings, _| settings.techniques.growl_pitch == GrowlPitch::Fixed,
+        may_be_played: false,
+        why: "is for a growl at a pitch of its own, and this one follows the note; add --set growlp=fixed",
+    },
+    Need {
+        ids: &["growli"],
+        is_met: |settings, _| settings.techniques.growl_pitch == GrowlPitch::Interval,
+        may_be_played: false,
+        why: "is for a growl that follows the note, and this one has a pitch of its own; leave --set growlp=fixed out",
     },
     Need {
         ids: &["fluthz"],

@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
 use crate::cli::plot_args::PlotArgs;
-use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, QualityArg, whole, within};
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, QualityArg, counted, whole, within};
 use chalumeau_core::analysis::impedance::cutoff_hz;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
@@ -226,7 +226,8 @@ impl ImpedanceCommand {
         if matches!(bore, Bore::Lattice(_)) {
             let exact = Bore::Tmm(exact);
             let theirs = exact.peaks(&of.open, volume_m3, count);
-            let shown: Vec<&Peak> = modes.iter().filter(|mode| mode.f_hz <= self.range.last_hz()).collect();
+            let range = self.range.first_hz()..=self.range.last_hz();
+            let shown: Vec<&Peak> = modes.iter().filter(|mode| range.contains(&mode.f_hz)).collect();
             let apart: Vec<(f64, f64)> = shown
                 .iter()
                 .filter_map(|a| {
@@ -242,8 +243,8 @@ impl ImpedanceCommand {
                     alone => format!("; {alone} more in the lattice alone"),
                 };
                 notes.push(format!(
-                    "{} modes, lattice against transfer matrices: mean {:.1} cents, {:.2} dB{alone}",
-                    apart.len(),
+                    "{}, lattice against transfer matrices: mean {:.1} cents, {:.2} dB{alone}",
+                    counted(apart.len(), "mode"),
                     mean(|&(cents, _)| cents),
                     mean(|&(_, db)| db)
                 ));

@@ -15,6 +15,17 @@ use std::path::PathBuf;
 /// The longest part that is measured, s: ten minutes need 1 GB at 48 kHz, and half a minute.
 const LONGEST_S: f64 = 600.0;
 
+/// Pitches up to here are measured, Hz.
+const HIGHEST_HZ: f64 = 2_500.0;
+/// A note without odd harmonics: all of them lie below this, dB re the strongest. A clarinet's are never so weak.
+const NO_ODD_DB: f64 = -60.0;
+
+/// Whether it is a note above the highest pitch, found an octave too low: twice its period is within the range, and it has no odd
+/// harmonics then.
+fn is_beyond(note: &Note) -> bool {
+    2.0 * note.f0_hz > HIGHEST_HZ && note.levels_db.iter().step_by(2).all(|level| !(*level > NO_ODD_DB))
+}
+
 /// A note whose lowest harmonics all lie below this is the common period of several, dB re the strongest (by judgement; a clarinet's
 /// first lies within some 20 dB).
 const HOLLOW_DB: f64 = -30.0;
@@ -87,6 +98,10 @@ impl MeasureCommand {
         let spinner = waiting("finding the notes");
         let (notes, track) = recording::notes(&sound.samples, f64::from(sound.rate));
         spinner.finish_and_clear();
+        let (high, notes): (Vec<Note>, Vec<Note>) = notes.into_iter().partition(is_beyond);
+        if !high.is_empty() {
+            say!("note: {} above {HIGHEST_HZ} Hz left out", counted(high.len(), "note"));
+        }
         let channel = match self.channel {
             Some(channel) => format!("channel {channel} of {}", sound.channels),
             None if sound.channels == 1 => "mono".to_owned(),
@@ -103,12 +118,13 @@ impl MeasureCommand {
             let levels =
                 (0..HARMONICS).map(|n| number(note.levels_db.get(n).copied().unwrap_or(f64::NAN), 1));
             table.line(format_args!(
-                "{:.3},{:.3},{},{},{:.3},{off_cents:.2},{:.2},{:.3},{:.1},{}",
+                "{:.3},{:.3},{},{},{:.3},{},{:.2},{:.3},{:.1},{}",
                 self.from + note.start_s,
                 self.from + note.end_s,
                 sounding.0,
                 named(sounding),
                 note.f0_hz,
+                number(off_cents, 2),
                 note.level_dbfs,
                 note.t90_s,
                 note.centroid_hz,

@@ -11,7 +11,9 @@ use clap::Args;
 
 /// A reed in newtons and millimetres; what is not given is the reference reed's.
 #[derive(Args, Clone, Copy)]
-#[command(next_help_heading = "Reed as measured, instead of H, k and zeta")]
+#[command(
+    next_help_heading = "Reed as measured, instead of H, k and zeta; --strength multiplies its stiffness, --lip its opening"
+)]
 pub struct PhysicalReedArgs {
     /// Stiffness K, N/m, 100..20000 [default: the reference reed's; 1218 on a B flat clarinet]
     #[arg(long, value_name = "N_PER_M", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 100.0, 20_000.0))]

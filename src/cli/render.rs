@@ -269,7 +269,7 @@ impl RenderCommand {
 }
 
 /// Whether a note is held for a tenth of a second or more after `seconds`.
-fn is_held_beyond(job: &RenderJob, seconds: f64) -> bool {
+pub fn is_held_beyond(job: &RenderJob, seconds: f64) -> bool {
     let least = ((seconds + 0.1) * f64::from(job.rate)) as usize;
     let notes = job.settings.reach.key_notes(&job.model);
     job.score.note_spans(&notes).iter().any(|span| span.to >= least)

@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::PlayedArgs;
-use chalumeau_core::event::{Event, PartEvent};
+use chalumeau_core::event::{Event, PartEvent, SettingNumber};
 use chalumeau_core::instrument::listening::ListeningMode;
 use chalumeau_core::instrument::side_by_side::{PlayedBeside, Stand};
 use chalumeau_core::instrument::{Clarinet, Ensemble, Model, Probe, Settings};
@@ -55,6 +55,15 @@ impl RenderJob {
             warnings: Vec::new(),
             idle: None,
         }
+    }
+
+    /// Whether a growl is heard somewhere.
+    pub(super) fn growls(&self) -> bool {
+        let is_growl = |event: Event| match event {
+            Event::Set(SettingNumber::Growl, amount) => amount > 0.0,
+            _ => false,
+        };
+        self.settings.techniques.growl > 0.0 || self.score.events.iter().any(|event| is_growl(event.event))
     }
 
     /// The instrument as a host has it before it plays: the settings are in place from the first sample.

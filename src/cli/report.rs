@@ -4,9 +4,10 @@ mod breath_and_haptics;
 mod tour;
 
 use crate::cli::Failure;
+use crate::cli::doubt::Doubt;
 use crate::cli::files;
 use crate::cli::progress_bar::progress;
-use crate::cli::render::about;
+use crate::cli::render::{about, is_held_beyond};
 use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::{RenderMonitor, RenderSummary};
 use crate::cli::report::breath_and_haptics::BreathAndHaptics;
@@ -17,7 +18,7 @@ use crate::cli::words::typed;
 use crate::identity;
 use crate::output::{NewFile, resolved};
 use crate::parameters::{PARAMETERS, Parameter, Sets, Value};
-use crate::wav::{Depth, WavFile};
+use crate::wav::{BEGINNING_S, Depth, WavFile};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::measure::notes::{MeasuredNote, Spread, spread};
 use chalumeau_figure::report::{Plate, Report as Page, ReportTable, Sound, TableCell, write};
@@ -91,7 +92,7 @@ impl ReportCommand {
         }
         let watch = RenderMonitor::new(&prepared, self.plot_at)?;
         let mut page = NewFile::create(&self.out, self.force)?;
-        let (sound, wav, watched) = match &self.wav {
+        let (sound, wav, (watched, doubts)) = match &self.wav {
             Some(path) => {
                 let mut wav = NewFile::create(path, self.force)?;
                 let watched = played(&prepared, watch, &mut wav)?;
@@ -110,6 +111,10 @@ impl ReportCommand {
             wav.keep()?;
         }
         say!("{}: written; open it in a browser", self.out.display());
+        doubts.iter().for_each(|doubt| say!("warning: {}", doubt.text()));
+        if let Some(idle) = &prepared.idle {
+            say!("warning: {idle}");
+        }
         Ok(())
     }
 
@@ -157,7 +162,7 @@ impl ReportCommand {
     fn page(&self, prepared: &RenderJob, watched: &RenderSummary, sound: Sound) -> Result<Page, Failure> {
         let (file, title) = (&prepared.model.file, self.play.title());
         let mut lines = about(prepared);
-        let outcome = pitches_in_words(&watched.heard);
+        let outcome = pitches_in_words(&watched.heard, prepared.growls());
         lines.push(outcome.clone());
         let longest = watched.heard.iter().max_by_key(|heard| heard.span.to - heard.span.from);
         let longest = longest.and_then(|heard| heard.span.note.written(file.transposition));
@@ -218,20 +223,21 @@ fn played(
     prepared: &RenderJob,
     watch: RenderMonitor,
     out: &mut (impl Write + Seek),
-) -> Result<RenderSummary, Failure> {
+) -> Result<(RenderSummary, Vec<Doubt>), Failure> {
     let samples = prepared.score.samples;
     let mut wav = WavFile::new(out, prepared.rate, Depth::Int16, 1, samples)?;
     let bar = progress(samples);
     // Samples and insides come in turn.
     let watch = RefCell::new(watch);
-    prepared.play(1, Some(&mut |inside| watch.borrow_mut().inside(inside)), |sent, heard| {
+    let resets = prepared.play(1, Some(&mut |inside| watch.borrow_mut().inside(inside)), |sent, heard| {
         bar.inc(sent.len() as u64);
         watch.borrow_mut().hear(sent);
         wav.write(heard).map_err(Failure::from)
     })?;
-    wav.finish()?;
+    let level = wav.finish()?;
     bar.finish_and_clear();
-    Ok(watch.into_inner().finish())
+    let doubts = Doubt::all(level, resets, is_held_beyond(prepared, BEGINNING_S)).collect();
+    Ok((watch.into_inner().finish(), doubts))
 }
 
 fn name(path: &Path) -> String {
@@ -253,7 +259,7 @@ fn signed(cents: f64) -> String {
 }
 
 /// How many notes have a pitch, and how far they lie from equal temperament.
-fn pitches_in_words(heard: &[MeasuredNote]) -> String {
+fn pitches_in_words(heard: &[MeasuredNote], growls: bool) -> String {
     let Some(Spread { count, own, others }) = spread(heard) else { return "No note has a pitch.".to_owned() };
     let mut words = format!("{count} of {} notes have a pitch", heard.len());
     if let Some((mean, largest)) = own {
@@ -265,6 +271,9 @@ fn pitches_in_words(heard: &[MeasuredNote]) -> String {
         Some((several, off)) => format!("; {several} sound other notes, up to {} cents off", signed(off)),
         None => String::new(),
     };
+    if growls && others.is_some() {
+        words += " (a growl may have the period of the voice, an octave below)";
+    }
     words + "."
 }
 

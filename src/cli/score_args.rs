@@ -12,7 +12,7 @@ use crate::cli::idle_settings::{self, Idle};
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
-use crate::cli::silent_keys::{hidden_in_chords, silent_notes};
+use crate::cli::silent_keys::{never_heard, silent_notes};
 use crate::controllers::{ControllerMap, as_links};
 use crate::presets::{self, Preset};
 use crate::scale_file;
@@ -96,7 +96,7 @@ pub struct ScoreArgs {
     #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, NOTE_S.0, NOTE_S.1))]
     seconds: Option<f64>,
     /// Time to fade after the last event, s, 0..60 [default: 1; for a single note 0; longer with
-    /// --fall or --breath-in]
+    /// --fall, --breath-in and --room]
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 60.0))]
     tail: Option<f64>,
 
@@ -230,7 +230,12 @@ impl ScoreArgs {
         };
         if let Some(typed) = self.settings.unison_given()?.filter(|_| settings.players.count == 1) {
             return Err(Failure::Usage(format!(
-                "{typed} is for several players, and one plays; add --players, or leave it out"
+                "{typed} is for several players, and {}",
+                if self.tracks {
+                    "--tracks gives each track a player of its own; leave it out"
+                } else {
+                    "one plays; add --players, or leave it out"
+                }
             )));
         }
         let mut warnings: Vec<_> = only_in_the_plugin(&map).into_iter().collect();
@@ -286,7 +291,7 @@ impl ScoreArgs {
             Arc::make_mut(&mut model).keys = keys;
         }
         warnings.extend(silent_notes(&parts.events, &unplayed, &model, settings.reach));
-        warnings.extend(hidden_in_chords(&parts.events, &model, settings.reach));
+        warnings.extend(never_heard(&parts.events, &model, settings.reach));
         if let Some(take) = &take {
             let design = replay::feel(&self.feel, Some(take), &model.file)?;
             warnings.extend(replay::too_short(take, &parts, self.rate));
@@ -294,9 +299,10 @@ impl ScoreArgs {
             warnings.extend(replay::differences(take, (&design, is_given), &model, &settings)?);
             parts.events = replay::events(take, &design, &model, &settings, &parts, self.rate)?;
         }
-        // A single note lasts as long as was asked; a melody gets time to fade.
+        // A single note lasts as long as was asked; a melody gets time to fade, and a room to die away.
         let one_note = self.written.is_some() || self.sounding.is_some();
-        let usual = if one_note { 0.0 } else { 1.0 } + settings.articulation.tail_s();
+        let room_s = if settings.room.amount > 0.0 { f64::from(settings.room.decay_s) } else { 0.0 };
+        let usual = if one_note { 0.0 } else { 1.0 } + settings.articulation.tail_s() + room_s;
         let parts = parts.with_tail(self.tail.unwrap_or(usual), self.rate);
         Ok(RenderJob {
             model,

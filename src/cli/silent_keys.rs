@@ -25,10 +25,10 @@ pub fn silent_notes(
     silent_keys(&asked.collect::<Vec<_>>(), model, reach)
 }
 
-/// Says how many notes are never heard, because a later one of the same moment is held as long.
-pub fn hidden_in_chords(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Option<String> {
+/// Says how many notes are never heard, because they have no length, or because a later one of the same moment is held as long.
+pub fn never_heard(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Vec<String> {
     let mut hands: Vec<Hand> = Vec::new();
-    let (mut hidden, mut now) = (0, 0);
+    let (mut hidden, mut brief, mut now) = (0, 0, 0);
     for timed in events {
         if timed.at > now {
             hands.iter_mut().for_each(Hand::hear);
@@ -37,10 +37,11 @@ pub fn hidden_in_chords(events: &[Timed<PartEvent>], model: &Model, reach: Reach
         let to = timed.event.to;
         let at = hands.iter().position(|hand| hand.to == to).unwrap_or(hands.len());
         if at == hands.len() {
-            hands.push(Hand { to, keys: Keys::default(), unheard: Vec::new() });
+            hands.push(Hand { to, keys: Keys::default(), unheard: Vec::new(), was_alone: true });
         }
         let hand = &mut hands[at];
-        hidden += match timed.event.event {
+        let is_alone = hand.unheard.len() == 1 && hand.was_alone;
+        let ended = match timed.event.event {
             Event::NoteOn { note, .. } if reach.fingering(note, model).is_some() => hand.press(note),
             Event::NoteOff { note } | Event::Choke { note } => hand.release(note),
             Event::Panic => {
@@ -49,15 +50,21 @@ pub fn hidden_in_chords(events: &[Timed<PartEvent>], model: &Model, reach: Reach
             }
             _ => 0,
         };
+        // It began and ended in this moment, with no other.
+        *(if is_alone { &mut brief } else { &mut hidden }) += ended;
     }
     hands.iter_mut().for_each(Hand::hear);
     hidden += hands.iter().map(|hand| hand.unheard.len()).sum::<usize>();
-    (hidden > 0).then(|| {
+    let notes = |count: usize| if count == 1 { "1 note is".to_owned() } else { format!("{count} notes are") };
+    let brief =
+        (brief > 0).then(|| format!("{} never heard: no time lies between beginning and end", notes(brief)));
+    let hidden = (hidden > 0).then(|| {
         format!(
             "{} never heard: another begins in the same moment and lasts as long. A clarinet plays one note at a time, of a chord the last in the file; --players 2 or more play chords",
-            if hidden == 1 { "1 note is".to_owned() } else { format!("{hidden} notes are") }
+            notes(hidden)
         )
-    })
+    });
+    brief.into_iter().chain(hidden).collect()
 }
 
 /// The keys that a player holds.
@@ -66,6 +73,8 @@ struct Hand {
     keys: Keys,
     /// Those that have not been heard yet.
     unheard: Vec<SoundingNote>,
+    /// At most one of them has begun in this moment.
+    was_alone: bool,
 }
 
 impl Hand {
@@ -73,12 +82,14 @@ impl Hand {
     fn hear(&mut self) {
         let heard = self.keys.last();
         self.unheard.retain(|&key| Some(key) != heard);
+        self.was_alone = self.unheard.is_empty();
     }
 
     /// Returns how many notes end unheard.
     fn press(&mut self, note: SoundingNote) -> usize {
         let ended = self.release(note);
         self.keys.press(note);
+        self.was_alone = self.unheard.is_empty();
         self.unheard.push(note);
         ended
     }
@@ -112,8 +123,16 @@ pub fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -> Vec<S
     let is_nowhere = |key: &&SoundingNote| {
         reach.key_switches.chosen(key.0).is_none() && reach.find(**key, &model.keys, Some).is_none()
     };
-    let nowhere = asked.iter().filter(is_nowhere).count();
-    let count = missing.len() + nowhere;
+    let nowhere: Vec<SoundingNote> = asked.iter().copied().filter(|key| is_nowhere(&key)).collect();
+    if !nowhere.is_empty() {
+        said.push(format!(
+            "the scale or its keyboard mapping gives {} no pitch within the range of MIDI, and {} silent{}",
+            if nowhere.len() == 1 { "1 key".to_owned() } else { format!("{} keys", nowhere.len()) },
+            if nowhere.len() == 1 { "it stays" } else { "they stay" },
+            names_of(&nowhere),
+        ));
+    }
+    let count = missing.len();
     if count > 0 {
         let (low, high) = (file.lowest(), file.highest());
         said.push(format!(
@@ -123,7 +142,7 @@ pub fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -> Vec<S
             names_of(&missing),
             sounds(low),
             sounds(high),
-            if nowhere == 0 { who_has(&missing) } else { String::new() }
+            who_has(&missing)
         ));
     }
     if !muted.is_empty() {

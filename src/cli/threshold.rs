@@ -56,7 +56,12 @@ impl ThresholdCommand {
         let model = TransferMatrix::new(&file, self.air.air());
         let plot = self.plot.open(self.table.force())?;
         let mut table = self.table.open_beside(&plot, "written_midi,gamma_on")?;
-        table.comment(format_args!("{}; quasi-static reed, zeta {}", file.name, self.zeta))?;
+        table.comment(format_args!(
+            "{}; quasi-static reed, zeta {}; {:.1} C",
+            file.name,
+            self.zeta,
+            self.air.air().temperature_c
+        ))?;
         // Height of the peak each note plays on: the same for every embouchure.
         let heights: Vec<(u8, Option<f64>)> = notes
             .into_iter()

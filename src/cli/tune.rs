@@ -106,6 +106,7 @@ impl TuneCommand {
         }
         let rate = self.rate;
         let name = with_preset(&file.name, self.preset.as_ref());
+        let transposition = file.transposition;
         let plot = self.plot.open(self.table.force())?;
         let mut table =
             self.table.open_beside(&plot, "written_midi,f_hz,cents,register_ok,as_built_cents")?;
@@ -130,7 +131,8 @@ impl TuneCommand {
             match heard {
                 Some((f_hz, cents)) => {
                     let register_ok = u8::from(cents.abs() <= OTHER_CENTS);
-                    table.line(format_args!("{written},{f_hz:.5},{cents:.3},{register_ok},{as_built}"))?;
+                    let cents = number(*cents, 3);
+                    table.line(format_args!("{written},{f_hz:.5},{cents},{register_ok},{as_built}"))?;
                 }
                 None => table.line(format_args!("{written},nan,nan,0,{as_built}"))?,
             }
@@ -156,6 +158,13 @@ impl TuneCommand {
         let silent: Vec<_> = silent.map(|(note, _)| note.to_string()).collect();
         if !silent.is_empty() {
             say!("note: with {blown} there is no tone on {}", silent.join(" "));
+        }
+        let beyond = |note: &WrittenNote| {
+            let sounding = note.sounding(transposition);
+            sounding.is_some_and(|note| note.frequency_hz(f64::from(settings.a4_hz)) > 0.45 * f64::from(rate))
+        };
+        if notes.iter().any(beyond) {
+            say!("note: a rate of {rate} Hz has no room for the highest of these notes; --rate 48000 has");
         }
         plot.draw(|| {
             let mut rounds = Vec::new();

@@ -161,7 +161,10 @@ impl AlterationEditor {
 
     /// Where the altered instrument was saved or why it was not, from the right of the row at the top of `within`.
     pub fn saved(ui: &mut Ui, within: Rect, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-        let Some(saved) = &snapshot.saved else { return };
+        // Nothing is altered any more: what was saved is no longer here.
+        let Some(saved) = snapshot.saved.as_ref().filter(|_| !snapshot.alterations.is_empty()) else {
+            return;
+        };
         let c = Colours::here(ui);
         let row = Rect::from_min_max(within.min, pos2(within.right(), within.top() + ROW));
         let layout = Layout::right_to_left(Align::Center);

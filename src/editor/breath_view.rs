@@ -89,8 +89,9 @@ impl BreathView {
         }
         heading(ui, "Microphone");
         switch(ui, hands, "mic");
-        momentary(ui, hands, "miccal", "Measure the room");
-        let said = microphone_line(hands.step("mic") == 1, snapshot.microphone);
+        let is_on = hands.step("mic") == 1;
+        ui.add_enabled_ui(is_on, |ui| momentary(ui, hands, "miccal", "Measure the room"));
+        let said = microphone_line(is_on, snapshot.microphone);
         let ink = if said.1 { c.danger } else { c.quiet };
         ui.label(egui::RichText::new(said.0).font(theme::small()).color(ink));
         heading(ui, "Response");
@@ -348,6 +349,7 @@ fn draw_marks(
     time: impl Fn(usize) -> f64,
     (full, height): (f64, f64),
 ) {
+    let mut words = Vec::new();
     for mark in 0..4 {
         let has = |n: &usize| marks[*n][mark].0.is_some();
         let times: Vec<usize> = (0..marks.len()).collect();
@@ -359,13 +361,20 @@ fn draw_marks(
             let line = chart::curve(points, colour, 1.0).id(("mark", mark, index));
             plot.line(line.style(egui_plot::LineStyle::dashed_loose()));
             if index == 0 && first[1] < full {
-                // "speaks" and "beats" are neighbours: one below its line, one above, where the chart has room above.
-                let is_high = (full - first[1]) / full * height < f64::from(WORD_HEIGHT);
-                let is_below = name == "speaks" || is_high;
-                let anchor = if is_below { Align2::LEFT_TOP } else { Align2::LEFT_BOTTOM };
-                chart::word(plot, first, anchor, &format!(" {name}"), colour);
+                words.push((first, name, colour));
             }
         }
+    }
+    // From the top: each above its line where there is room, and below the word before it.
+    let word_kpa = f64::from(WORD_HEIGHT) * full / height;
+    words.sort_by(|(a, ..), (b, ..)| b[1].total_cmp(&a[1]));
+    let mut room = full;
+    for ([time, kpa], name, colour) in words {
+        // "speaks" and "beats" are neighbours: one below its line, one above.
+        let above = if name == "speaks" { kpa } else { kpa + word_kpa };
+        let top = if above > room { room.min(kpa) } else { above };
+        room = top - word_kpa;
+        chart::word(plot, [time, top], Align2::LEFT_TOP, &format!(" {name}"), colour);
     }
 }
 

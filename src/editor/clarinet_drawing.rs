@@ -105,7 +105,15 @@ pub(super) struct HolePlace {
 
 impl<'a> ClarinetDrawing<'a> {
     pub(super) fn new(file: &'a InstrumentFile, area: Rect) -> Self {
-        let shape = BodyShape::new(file);
+        Self::of(file, BodyShape::new(file), area)
+    }
+
+    /// The same in another place.
+    pub(super) fn moved(self, area: Rect) -> Self {
+        Self::of(self.file, self.shape, area)
+    }
+
+    fn of(file: &'a InstrumentFile, shape: BodyShape, area: Rect) -> Self {
         let by_width = area.width() / shape.length_m as f32;
         // A short, wide instrument takes at most half of the height.
         let scale = by_width.min(0.5 * area.height() / (2.0 * shape.widest_m) as f32);
@@ -120,6 +128,10 @@ impl<'a> ClarinetDrawing<'a> {
 
     pub(super) fn top(&self) -> f32 {
         self.axis - self.scale * self.shape.widest_m as f32
+    }
+
+    pub(super) fn bottom(&self) -> f32 {
+        self.axis + self.scale * self.shape.widest_m as f32
     }
 
     pub(super) fn paint(&self, painter: &Painter, c: &Colours, wave: &[(f32, f32)]) {

@@ -36,6 +36,10 @@ const NAMED: f32 = 38.0;
 const NAME_LINE: f32 = 13.0;
 /// Least height of the picture in which two rows of names leave the clarinet its room, points.
 const ROOM_FOR_TWO: f32 = 220.0;
+/// Least height of the picture in which there is room for names, points.
+const ROOM_FOR_NAMES: f32 = 180.0;
+/// Least distance of the body and the buttons, in which lines lead from one to the other, points.
+const LINES: f32 = 16.0;
 /// Height of a name, points.
 const NAME_ROW: f32 = 2.0 * NAME_LINE;
 
@@ -107,7 +111,13 @@ impl ClarinetView {
         let area = ui.available_rect_before_wrap();
         ui.allocate_rect(area, Sense::hover());
         let painter = ui.painter_at(area.expand(2.0));
-        let body = ClarinetDrawing::new(file, area);
+        let rows = name_rows(area.width() / file.holes.len().max(1) as f32, area.height());
+        let buttons = hole_buttons(area, file.holes.len(), 4.0 + rows as f32 * NAME_ROW);
+        let mut body = ClarinetDrawing::new(file, area);
+        let room = buttons.first().map_or(area.bottom(), |button| button.top() - LINES);
+        if body.bottom() > room {
+            body = body.moved(Rect::from_min_max(area.min, pos2(area.right(), room)));
+        }
         let wave = wave_rect(area, &body);
         ruler(&painter, c, area, body.scale);
         painter.text(
@@ -121,8 +131,6 @@ impl ClarinetView {
         part_names(&painter, c, &body, wave.bottom() + 1.0);
         body.paint(&painter, c, &snapshot.standing);
         self.joints(ui, &body, snapshot, actions);
-        let rows = name_rows(area.width() / file.holes.len().max(1) as f32, area.height());
-        let buttons = hole_buttons(area, file.holes.len(), 4.0 + rows as f32 * NAME_ROW);
         for (hole, tone_hole) in file.holes.iter().enumerate() {
             let opening = match trial.open() {
                 Some(tried) => f32::from(tried.get(hole).copied().unwrap_or(false)),
@@ -252,7 +260,9 @@ impl ClarinetView {
                     for (index, choice) in of_register {
                         let (name, is_here) = (name(choice), shown == Some(index));
                         let size = vec2(width.clamp(26.0, 46.0), line);
-                        let response = chip(ui, c, &name, size, is_here, choice.nth > 0);
+                        // Of a multiphonic it is the number.
+                        let is_alternate = choice.nth > 0 && register != multiphonic_choices::REGISTER;
+                        let response = chip(ui, c, &name, size, is_here, is_alternate);
                         response.widget_info(|| {
                             let label = format!("Fingering {name}");
                             WidgetInfo::selected(Role::RadioButton, true, is_here, label)
@@ -347,7 +357,9 @@ fn wave_rect(area: Rect, body: &ClarinetDrawing<'_>) -> Rect {
 
 /// Rows of names below buttons at this distance, in a picture of this height.
 fn name_rows(width: f32, height: f32) -> usize {
-    if width >= NAMED {
+    if height < ROOM_FOR_NAMES {
+        0
+    } else if width >= NAMED {
         1
     } else if 2.0 * width >= NAMED && height >= ROOM_FOR_TWO {
         2

@@ -54,8 +54,9 @@ pub fn draw(ui: &mut Ui, connections: &Connections, actions: &mut Vec<Action>) {
             });
             // WASAPI has a block length of its own.
             if !cfg!(windows) {
-                let tip = "Samples in a block. Small blocks respond faster, but the sound may drop out. JACK sets its own.";
-                let text = |block: &u32| format!("blocks of {block}");
+                let tip = "Samples in a block, and how long it takes. Small blocks respond faster, but the sound may drop out. JACK sets its own.";
+                let rate_hz = f64::from(choice.rate_hz);
+                let text = |block: &u32| format!("{block} \u{b7} {:.0} ms", 1e3 * f64::from(*block) / rate_hz);
                 choose(ui, "Samples per block", &mut choice.block, BLOCKS, text, tip);
             }
         });

@@ -6,7 +6,10 @@
 
 use crate::controllers::source_curves::SourceCurves;
 use crate::controllers::{ControllerLinks, ControllerMap};
+use std::path::Path;
+
 use crate::editor::ab_comparison::Values;
+use crate::editor::snapshot::{Snapshot, USER_FILE};
 use crate::editor::terms;
 use crate::editor::undo::{Change, DeviceChoice, Step, UndoHistory};
 
@@ -237,6 +240,16 @@ impl Hands<'_> {
             let changes = vec![Change { id, before: look.value, after }];
             self.history.record(Step { changes, ..Step::default() });
         }
+    }
+
+    /// Records as a step that an instrument file is opened, which the window asks for elsewhere.
+    pub fn record_instrument_file(&mut self, path: &Path, snapshot: &Snapshot) {
+        let Some(look) = self.controls.look("instr") else { return };
+        // The last of the list is the user's file.
+        let changes = vec![Change { id: "instr", before: look.value, after: 1.0 }];
+        let before = snapshot.instrument_key.strip_prefix(USER_FILE).unwrap_or_default().to_owned();
+        let file = Some([before, path.display().to_string()]);
+        self.history.record(Step { changes, file, ..Step::default() });
     }
 
     /// Sets values that are no new step: undo, redo, A/B.

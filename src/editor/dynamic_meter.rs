@@ -13,6 +13,8 @@ use crate::editor::theme::Colours;
 use chalumeau_core::instrument::BreathResponse;
 use chalumeau_core::instrument::player::dynamics::NAMED;
 
+/// Least distance of two words, points.
+const LINE: f32 = 18.0;
 /// Part of the column below the threshold.
 const BELOW: f32 = 0.07;
 
@@ -74,13 +76,25 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, grown: f32) {
         }
     }
     let mut lowest = f32::INFINITY;
+    // Between two dynamics.
+    let steps = reading.marks.windows(2).filter(|pair| pair.iter().all(|mark| mark.is_dynamic));
+    let step = steps.map(|pair| y(pair[0].at) - y(pair[1].at)).fold(f32::INFINITY, f32::min);
+    let is_low = step < LINE * grown;
+    // What the first line means, the tip says where it has no room for a word.
+    let dynamics = |mark: &&MeterMark| mark.is_dynamic;
+    let first = reading.marks.iter().find(dynamics).map_or(f32::NEG_INFINITY, |mark| y(mark.at));
     for mark in &reading.marks {
-        let text_y = y(mark.at).min(lowest - 15.0 * grown);
-        lowest = text_y;
+        let is_word = match mark.is_dynamic {
+            true => !is_low || ["pp", "mf", "ff"].contains(&mark.name),
+            false => reading.marks.iter().all(|mark| !mark.is_dynamic) || y(mark.at) - first >= LINE * grown,
+        };
         let reach = if mark.is_dynamic { 4.0 } else { 7.0 };
         let from = if mark.is_dynamic { column.right() } else { column.left() - 4.0 };
         let line = Stroke::new(if mark.is_dynamic { 1.0 } else { 2.0 }, mark.colour);
         painter.hline(from..=column.right() + reach, y(mark.at), line);
+        if !is_word {
+            continue;
+        }
         let is_reached = reading.level >= mark.at - 0.02;
         let ink = match (mark.is_dynamic, is_reached) {
             (true, true) => c.ink,
@@ -88,6 +102,8 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, grown: f32) {
             (false, _) => mark.colour,
         };
         let font = if mark.is_dynamic { FontId::proportional(15.0 * grown) } else { small.clone() };
+        let text_y = y(mark.at).min(lowest - 15.0 * grown);
+        lowest = text_y;
         let at = pos2(column.right() + reach + 4.0, text_y);
         if mark.is_dynamic {
             let job = italics(mark.name, font, ink);
@@ -103,7 +119,11 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, grown: f32) {
     let name = painter.layout(source.to_owned(), small, c.quiet, rect.width() - 10.0);
     painter.galley(at - vec2(0.0, name.size().y), name, c.quiet);
     let kpa = snapshot.mouth_now_kpa();
-    let told = format!("Mouth pressure {kpa:.2} kPa, {}, from {source}", reading.word);
+    let played = snapshot.settings.breath_response == BreathResponse::Played;
+    let told = match played {
+        true => format!("{}, from {source}. The green line: the note speaks from there.", reading.word),
+        false => format!("Mouth pressure {kpa:.2} kPa, {}, from {source}", reading.word),
+    };
     response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, &told));
     response.on_hover_text_at_pointer(told);
 }

@@ -8,7 +8,7 @@ use egui::{Key, RichText, Role, ScrollArea, TextEdit, Ui, WidgetInfo};
 
 use crate::editor::Action;
 use crate::editor::theme::{Colours, GAP, panel};
-use crate::folder_listing::{ENTRIES_MOST, FolderListing};
+use crate::folder_listing::{ENTRIES_MOST, FolderListing, Place};
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,14 @@ impl FileKind {
         match self {
             Self::Instrument => "Open an instrument file (.toml)",
             Self::Scale => "Open a scale (.scl) or a keyboard mapping (.kbm)",
+        }
+    }
+
+    /// Where its files are looked for first.
+    fn place(self) -> Place {
+        match self {
+            Self::Instrument => Place::Instruments,
+            Self::Scale => Place::Home,
         }
     }
 
@@ -54,13 +62,17 @@ pub struct FileBrowser {
     typed: String,
     /// The folder that `typed` began with.
     shown: PathBuf,
+    /// The folders in which files were chosen.
+    last: Vec<(FileKind, PathBuf)>,
 }
 
 impl FileBrowser {
     /// Opens it.
     pub fn open(&mut self, kind: FileKind, actions: &mut Vec<Action>) {
         (self.wanted, self.shown) = (Some(kind), PathBuf::new());
-        actions.push(Action::ReadFolder(None));
+        let last = self.last.iter().find(|(of, _)| *of == kind);
+        let place = last.map_or_else(|| kind.place(), |(_, folder)| Place::Folder(folder.clone()));
+        actions.push(Action::ReadFolder(place));
     }
 
     /// Whether it is in front.
@@ -116,10 +128,14 @@ impl FileBrowser {
             let above = listing.folder.parent();
             let up = ui.add_enabled(above.is_some(), egui::Button::new("Up"));
             if let Some(above) = above.filter(|_| up.clicked()) {
-                actions.push(Action::ReadFolder(Some(above.to_owned())));
+                actions.push(Action::ReadFolder(Place::Folder(above.to_owned())));
             }
             if ui.button("Home").clicked() {
-                actions.push(Action::ReadFolder(None));
+                actions.push(Action::ReadFolder(Place::Home));
+            }
+            let about = "Instruments that you have saved in this program";
+            if kind == FileKind::Instrument && ui.button("Yours").on_hover_text(about).clicked() {
+                actions.push(Action::ReadFolder(Place::Instruments));
             }
             let field = TextEdit::singleline(&mut self.typed).desired_width(ui.available_width() - 62.0);
             let field = ui.add(field.hint_text("path of a folder or file"));
@@ -130,7 +146,7 @@ impl FileBrowser {
                 if kind.fits(&self.typed) {
                     self.choose(kind, path, actions);
                 } else {
-                    actions.push(Action::ReadFolder(Some(path)));
+                    actions.push(Action::ReadFolder(Place::Folder(path)));
                 }
             }
         });
@@ -140,7 +156,7 @@ impl FileBrowser {
         let c = Colours::here(ui);
         for name in &listing.folders {
             if ui.selectable_label(false, format!("{name}/")).clicked() {
-                actions.push(Action::ReadFolder(Some(listing.folder.join(name))));
+                actions.push(Action::ReadFolder(Place::Folder(listing.folder.join(name))));
             }
         }
         let mut count = 0;
@@ -159,7 +175,12 @@ impl FileBrowser {
 
     fn choose(&mut self, kind: FileKind, path: PathBuf, actions: &mut Vec<Action>) {
         // A project keeps it, and may be opened from another folder.
-        actions.push(kind.open(std::path::absolute(&path).unwrap_or(path)));
+        let path = std::path::absolute(&path).unwrap_or(path);
+        if let Some(folder) = path.parent() {
+            self.last.retain(|(of, _)| *of != kind);
+            self.last.push((kind, folder.to_owned()));
+        }
+        actions.push(kind.open(path));
         self.close();
     }
 }

@@ -1,5 +1,7 @@
 //! The two lines on top: note, pitch and tools; tabs and status.
 
+use std::path::Path;
+
 use egui::{
     Align, Align2, CornerRadius, FontId, Layout, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
@@ -11,7 +13,7 @@ use crate::editor::controls::{momentary, segments};
 use crate::editor::lamps;
 use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::pitch_needle;
-use crate::editor::pitch_needle::NO_SOUND;
+use crate::editor::pitch_needle::{NO_PITCH, NO_SOUND};
 use crate::editor::preset_bar;
 use crate::editor::preset_browser::PresetBrowser;
 use crate::editor::snapshot::{Severity, Snapshot, Status};
@@ -190,11 +192,14 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
         named(kept.names.other()).map_or_else(String::new, |note| format!("{verb} {}", note_name(note)));
     let ink = if response.hovered() { c.ink } else { c.quiet };
     painter.text(pos2(x, rect.center().y - 1.0), Align2::LEFT_BOTTOM, &other, theme::small(), ink);
-    let pitch = snapshot.heard.f0_hz.map_or_else(|| NO_SOUND.to_owned(), |hz| format!("{hz:.1} Hz"));
+    let pitch = snapshot.heard.f0_hz.map_or_else(|| NO_PITCH.to_owned(), |hz| format!("{hz:.1} Hz"));
     let pitch = if has_pitch && has_played { pitch } else { String::new() };
     painter.text(pos2(x, rect.center().y + 1.0), Align2::LEFT_TOP, &pitch, theme::small(), c.quiet);
     let said = match has_played {
-        true => format!("{} {big}, {other}, {pitch}", kept.names.title()),
+        true => {
+            let pitch = if pitch == NO_PITCH { NO_SOUND } else { &pitch };
+            format!("{} {big}, {other}, {pitch}", kept.names.title())
+        }
         false => format!("{}, no note yet", kept.names.title()),
     };
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &said));
@@ -226,6 +231,8 @@ pub fn redo_step(hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Actio
 }
 
 fn restore(restored: Restored, hands: &mut Hands, actions: &mut Vec<Action>) {
+    // Before the choice of the user's file, so that no other one is read.
+    actions.extend(restored.file.map(Action::NameInstrumentFile));
     hands.restore(&restored.values);
     actions.extend(restored.preset.map(Action::ChosePreset));
     actions.extend(restored.alterations.map(Action::Alter));
@@ -241,6 +248,10 @@ fn step_name(hands: &Hands, step: &Step) -> String {
     match step {
         Step { moved: Some(moved), .. } => format!("the alteration of {}", moved.titles().join(", ")),
         Step { copied_from: Some(side), .. } => format!("the copy of {}", side.name()),
+        Step { file: Some([_, path]), .. } => {
+            let name = Path::new(path).file_name().map_or_else(|| path.into(), |name| name.to_string_lossy());
+            format!("the choice of {name}")
+        }
         Step { device: Some(DeviceChoice { name, .. }), .. } => format!("the choice of {name}"),
         Step { preset: Some([_, chosen]), .. } => format!("the choice of {chosen}"),
         Step { changes, .. } => {

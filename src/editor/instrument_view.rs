@@ -5,6 +5,7 @@ use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, Ui, WidgetInfo, 
 use crate::editor::Action;
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, ruler};
+use crate::editor::connections::OutputChoice;
 use crate::editor::connections_view;
 use crate::editor::controls::{Hands, choice, heading, segments, slider, teach};
 use crate::editor::file_browser::{FileBrowser, FileKind};
@@ -227,7 +228,7 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
         ("Length", format!("{:.1} mm", 1e3 * file.length_m())),
         ("Holes", file.holes.len().to_string()),
         ("Fingerings", file.fingerings.len().to_string()),
-        ("Latency", format!("{:.1} ms", snapshot.latency_ms)),
+        ("Latency", latency(snapshot)),
     ];
     let beside = if ui.available_width() > 520.0 { 2 } else { 1 };
     let grid = egui::Grid::new("facts").num_columns(2 * beside).spacing([18.0, 3.0]).min_row_height(20.0);
@@ -242,6 +243,19 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
     });
     ui.add_space(4.0);
     ui.label(RichText::new(&file.source).font(theme::small()).color(c.quiet));
+}
+
+/// Of the instrument, and in a program without a host of the sound card's block.
+fn latency(snapshot: &Snapshot) -> String {
+    let own = format!("{:.1} ms", snapshot.latency_ms);
+    let card = snapshot.connections.as_ref().map(|connections| &connections.chosen);
+    match card.filter(|chosen| chosen.output != OutputChoice::Jack) {
+        Some(chosen) => {
+            let block_ms = 1e3 * f64::from(chosen.block) / f64::from(chosen.rate_hz);
+            format!("{own}, and a block of {block_ms:.1} ms")
+        }
+        None => own,
+    }
 }
 
 fn column(
@@ -277,5 +291,8 @@ fn column(
     }
     heading(ui, "Output");
     slider(ui, hands, "gain");
-    choice(ui, hands, "qual");
+    // Of a host's exports.
+    if snapshot.connections.is_none() {
+        choice(ui, hands, "qual");
+    }
 }

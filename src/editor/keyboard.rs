@@ -38,7 +38,7 @@ const HELP_MARK: f32 = 14.0;
 
 const HELP: &str = "A key that is held shows the note it plays, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
 const LETTERS_HELP: &str = "The letters on the keys play them, too: C softer, V louder. Page Up and Page Down move the letters by an octave.";
-const SWITCH_KEY: &str = "This key makes no sound: the notes that follow take these fingerings, until another key of the row is struck. The colour shows which. *Key switches* in the Breath view moves the row.";
+const SWITCH_KEY: &str = "This key makes no sound: the notes that follow take these fingerings, until another key of the row is struck. The colour shows which. Key switches in the Breath view moves the row.";
 const SILENT_KEY: &str = "The instrument does not play this note in tune, so the key is silent.";
 
 /// What the keys remember.

@@ -35,10 +35,10 @@ pub fn about(choice: &FingeringChoice, names: NoteNames, transposition: i8) -> S
     let tones: Vec<String> = one.partials_hz.iter().map(|hz| format!("{hz:.0}")).collect();
     let key = names.of_written(choice.written, transposition).map_or_else(String::new, note_name);
     format!(
-        "M{}: {}. Tones at {} Hz. Found with the key {key} held, at a breath of {:.0} % where the breath response is Physical.",
+        "M{}: hold {key}, breath {:.0} %, breath response Physical. Tones at {} Hz. {}",
         choice.nth + 1,
-        fingers_title(&one.fingers),
+        100.0 * one.breath,
         tones.join(", "),
-        100.0 * one.breath
+        fingers_title(&one.fingers),
     )
 }

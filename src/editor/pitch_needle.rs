@@ -8,6 +8,8 @@ use crate::editor::theme::Colours;
 
 /// What stands where a pitch would, when nothing sounds.
 pub const NO_SOUND: &str = "no sound";
+/// What stands in place of a pitch then.
+pub const NO_PITCH: &str = "\u{2013}";
 /// The scale reaches so far each way, cents.
 const SCALE_CENTS: f32 = 50.0;
 /// Within this distance a listener hears the note as in tune, cents.
@@ -42,11 +44,17 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
             painter.circle_filled(pos2(x, line_y - 14.0), 3.0, colour);
             if cents.abs() < 0.5 { "in tune".into() } else { format!("{cents:+.0} cents") }
         }
-        None => NO_SOUND.into(),
+        None => NO_PITCH.into(),
     };
     let place = pos2(rect.right(), rect.top() - 1.0);
     painter.text(place, Align2::RIGHT_TOP, &text, theme::small(), c.quiet);
-    response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Pitch: {text}")));
+    response.widget_info(|| {
+        WidgetInfo::labeled(
+            Role::Meter,
+            true,
+            format!("Pitch: {}", if text == NO_PITCH { NO_SOUND } else { &text }),
+        )
+    });
     response.on_hover_text(format!(
         "Distance of the sound from the note, at A4 = {:.1} Hz",
         snapshot.settings.a4_hz

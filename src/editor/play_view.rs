@@ -148,15 +148,19 @@ fn back_to_the_note(
 ) {
     const BUTTON: f32 = 150.0;
     let c = Colours::here(ui);
-    let hint = if snapshot.sounding.is_none() { ": play a key to hear it" } else { "" };
-    let told = format!("Trying {tried}{hint}");
-    let words = one_line(ui, &told, theme::body(), c.ink, row.width() - BUTTON - 12.0);
-    let left = row.center().x - 0.5 * (words.size().x + 12.0 + BUTTON);
+    let trying = format!("Trying {tried}");
+    let hinted = format!("{trying}: play a key to hear it");
+    let line = |text: &str| one_line(ui, text, theme::body(), c.ink, row.width() - BUTTON - 12.0);
+    // The button stays where it is when the hint goes.
+    let left = row.center().x - 0.5 * (line(&hinted).size().x + 12.0 + BUTTON);
+    let button = Rect::from_min_size(pos2(left, row.top()), vec2(BUTTON, row.height()));
+    let told = if snapshot.sounding.is_none() { hinted } else { trying };
+    let words = line(&told);
+    let left = button.right() + 12.0;
     let place = Rect::from_min_size(pos2(left, row.center().y - 0.5 * words.size().y), words.size());
     let label = ui.interact(place, ui.scope_id().with("tried"), egui::Sense::hover());
     label.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &told));
     ui.painter().galley(place.min, words, c.ink);
-    let button = Rect::from_min_size(pos2(place.right() + 12.0, row.top()), vec2(BUTTON, row.height()));
     let back = ui.put(button, egui::Button::new("Back to the note"));
     if back.on_hover_text("Ends the trial; the played note sets the holes again").clicked() {
         trial.end(actions);

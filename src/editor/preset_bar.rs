@@ -38,12 +38,16 @@ pub fn bar(
     ui.painter().rect_filled(rect, CornerRadius::same(theme::SMALL_RADIUS), c.raised);
 
     let (shelf, name) = (&snapshot.presets, snapshot.preset.as_str());
-    let step = |ui: &Ui, by: isize, hands: &mut Hands, actions: &mut Vec<Action>| {
+    let step = |ui: &Ui, by: isize, browser: &PresetBrowser, hands: &mut Hands, actions: &mut Vec<Action>| {
         let x = if by < 0 { rect.left() } else { rect.right() - ARROW };
         let place = Rect::from_min_size(pos2(x, rect.top()), vec2(ARROW, rect.height()));
         let word = if by < 0 { "Previous preset" } else { "Next preset" };
-        let preset = shelf.beside(name, by);
-        let hint = preset.map_or_else(String::new, |preset| format!("{word}: {}", preset.name));
+        let preset = shelf.beside(name, by, |preset| browser.is_shown(preset, shelf));
+        let among = browser.among().map_or_else(String::new, |among| format!(" ({among})"));
+        let hint = match preset {
+            Some(preset) => format!("{word}: {}{among}", preset.name),
+            None => format!("No preset is like that{among}"),
+        };
         if arrow(ui, place, by as f32, word).on_hover_text(hint).clicked()
             && let Some(preset) = preset
         {
@@ -51,9 +55,9 @@ pub fn bar(
         }
     };
     // In the order of the Tab key.
-    step(ui, -1, hands, actions);
+    step(ui, -1, browser, hands, actions);
     name_button(ui, rect.shrink2(vec2(ARROW, 0.0)), browser, hands, snapshot, actions);
-    step(ui, 1, hands, actions);
+    step(ui, 1, browser, hands, actions);
 }
 
 /// The name of the preset with its tags, which opens the browser.
@@ -79,6 +83,11 @@ fn name_button(
         (Some(_), true) if tags.is_empty() => "changed".to_owned(),
         (Some(_), true) => format!("changed \u{b7} {tags}"),
         (Some(_), false) => tags,
+    };
+    // The arrows go through these alone.
+    let below = match browser.among() {
+        Some(among) => format!("only {among} \u{b7} {below}"),
+        None => below,
     };
     let width = middle.width() - 12.0;
     let at = |y: f32| pos2(middle.left() + 6.0, y);

@@ -4,6 +4,7 @@
 //! A click on a preset puts it on at once, so that it can be played. Work on files leaves as an [`Action`].
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use egui::{
     CornerRadius, Key, Rect, Response, RichText, Role, Sense, Shape, Stroke, StrokeKind, TextEdit, Ui,
@@ -37,6 +38,10 @@ pub struct PresetBrowser {
     reveal: Option<String>,
     /// Presets in the list of the frame before.
     listed: usize,
+    /// Rows that were seen in the frame before.
+    seen: Range<usize>,
+    /// The preset that was chosen in the frame before.
+    chosen: String,
 }
 
 /// What is being typed.
@@ -64,17 +69,26 @@ impl PresetBrowser {
         self.is_open = !self.is_open;
         self.form = None;
         if self.is_open {
-            self.show(chosen.to_owned());
+            (self.reveal, self.listed) = (Some(chosen.to_owned()), 0);
             actions.push(Action::ReadPresets);
         }
     }
 
-    /// Shows a preset in the list. What was looked for the last time would hide it, and the rest.
+    /// Shows a preset in the list. What was looked for the last time might hide it.
     fn show(&mut self, name: String) {
         self.search.clear();
         self.tags.clear();
         (self.favourites, self.yours) = (false, false);
         (self.reveal, self.listed) = (Some(name), 0);
+    }
+
+    /// What is looked for, in words; `None` where all presets are shown.
+    pub fn among(&self) -> Option<String> {
+        let search = self.search.trim();
+        let words = [(self.favourites, "favourites"), (self.yours, "yours"), (!search.is_empty(), search)];
+        let words = words.into_iter().filter(|(is_on, _)| *is_on).map(|(_, word)| word);
+        let all: Vec<&str> = words.chain(self.tags.iter().map(String::as_str)).collect();
+        (!all.is_empty()).then(|| all.join(", "))
     }
 
     /// Draws it.
@@ -106,6 +120,9 @@ impl PresetBrowser {
                 field.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, "Search presets"));
                 chip(ui, "Favourites", &mut self.favourites);
                 chip(ui, "Yours", &mut self.yours);
+                if self.among().is_some() && ui.button("All").on_hover_text("Shows all presets").clicked() {
+                    self.show(snapshot.preset.clone());
+                }
             });
             ui.horizontal_wrapped(|ui| {
                 for tag in snapshot.presets.tags() {
@@ -124,7 +141,8 @@ impl PresetBrowser {
         });
     }
 
-    fn is_shown(&self, preset: &Preset, shelf: &PresetShelf) -> bool {
+    /// Whether it is among those that are looked for.
+    pub fn is_shown(&self, preset: &Preset, shelf: &PresetShelf) -> bool {
         (!self.favourites || shelf.is_liked(&preset.name))
             && (!self.yours || shelf.is_users(&preset.name))
             && self.tags.iter().all(|tag| preset.has_tag(tag))
@@ -146,7 +164,26 @@ impl PresetBrowser {
         }
         ui.spacing_mut().item_spacing.y = 0.0;
         let mut area = egui::ScrollArea::vertical().id_salt("presets").auto_shrink([false, false]);
+        // The arrows choose while nothing else has the focus.
+        let is_free = ui.memory(|memory| memory.focused().is_none());
+        let pressed = |key| ui.input_mut(|input| input.consume_key(egui::Modifiers::NONE, key));
+        for (key, by) in [(Key::ArrowDown, 1), (Key::ArrowUp, -1)] {
+            if is_free
+                && pressed(key)
+                && let Some(preset) =
+                    shelf.beside(&snapshot.preset, by, |preset| self.is_shown(preset, shelf))
+            {
+                choose(preset, &snapshot.preset, hands, actions);
+            }
+        }
         let found = |name: &String| shown.iter().position(|preset| preset.name == *name);
+        // What is chosen by an arrow, or by undo, comes into sight.
+        if self.chosen != snapshot.preset {
+            self.chosen.clone_from(&snapshot.preset);
+            if found(&self.chosen).is_some_and(|at| !self.seen.contains(&at)) {
+                self.reveal = Some(self.chosen.clone());
+            }
+        }
         let before = std::mem::replace(&mut self.listed, shown.len());
         let wanted = self.reveal.as_ref().and_then(found);
         // A list that has grown knows its length a frame later: it would spring back from beyond the end of before.
@@ -160,7 +197,10 @@ impl PresetBrowser {
             area = area.vertical_scroll_offset(middle.clamp(0.0, most));
             self.reveal = None;
         }
+        let seen = &mut self.seen;
         area.show_rows(ui, ROW, shown.len(), |ui, rows| {
+            // The rows at both ends may be cut.
+            *seen = rows.start + 1..rows.end.saturating_sub(1);
             for preset in &shown[rows] {
                 let is_here = snapshot.preset == preset.name;
                 let (row, star) = row(ui, preset, is_here, shelf);

@@ -21,6 +21,9 @@ use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::instrument::{KeyPitches, Settings};
 use chalumeau_core::units::{SoundingNote, WrittenNote, clamped_or};
 
+/// How the name of an instrument begins that is a file of the user's; its path follows.
+pub const USER_FILE: &str = "user:";
+
 /// Less mouth pressure than this is no breath, kPa.
 pub const NO_BREATH_KPA: f32 = 0.02;
 
@@ -31,7 +34,7 @@ pub struct Snapshot {
     pub instrument: Arc<InstrumentFile>,
     /// The same as its file has it, before any alteration and before scaling.
     pub as_built: Arc<InstrumentFile>,
-    /// What names this instrument in a saved project.
+    /// What names this instrument in a saved project; a file of the user's begins with [`USER_FILE`].
     pub instrument_key: String,
     /// Whether it can be altered: not while another one comes.
     pub can_alter: bool,

@@ -13,6 +13,7 @@ use crate::editor::controls::{Hands, choice, heading, slider};
 use crate::editor::pitch_needle::{self, NO_SOUND};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::sound_analysis::FLOOR_DB;
+use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 
 /// Highest harmonic marked.
@@ -205,6 +206,11 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     }
     heading(ui, "Players");
     slider(ui, hands, "player");
+    if hands.step("player") == 0 {
+        let c = Colours::here(ui);
+        let alone = "With one player, these change nothing.";
+        ui.label(egui::RichText::new(alone).font(theme::small()).color(c.quiet));
+    }
     choice(ui, hands, "split");
     for id in ["spread", "seats"] {
         slider(ui, hands, id);

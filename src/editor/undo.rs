@@ -108,6 +108,8 @@ pub struct Step {
     pub moved: Option<Move>,
     /// The device that it chose, if it chose one.
     pub device: Option<DeviceChoice>,
+    /// The instrument file before and after it, if it opened one; empty for the usual place.
+    pub file: Option<[String; 2]>,
 }
 
 impl Step {
@@ -129,6 +131,8 @@ pub struct Restored {
     /// Links of controllers, if the step chose a device: those that the step left, and those to bring back in their place. Where others
     /// are there, the user has changed them since.
     pub links: Option<[String; 2]>,
+    /// The instrument file, if the step opened one.
+    pub file: Option<String>,
 }
 
 /// The steps that can be undone, and those that can be redone.
@@ -170,7 +174,8 @@ impl UndoHistory {
     pub fn record(&mut self, mut step: Step) {
         step.changes.retain(|change| change.before != change.after);
         let has_linked = step.device.as_ref().is_some_and(|device| device.before != device.after);
-        if step.changes.is_empty() && !has_linked {
+        let has_opened = step.file.as_ref().is_some_and(|[before, after]| before != after);
+        if step.changes.is_empty() && !has_linked && !has_opened {
             return;
         }
         self.undone.clear();
@@ -221,8 +226,9 @@ impl UndoHistory {
         let preset = step.preset.as_ref().map(|[before, _]| before.clone());
         let alterations = step.moved.as_ref().map(|moved| moved.brought(now, &moved.before));
         let links = step.device.as_ref().map(|device| [device.after.clone(), device.before.clone()]);
+        let file = step.file.as_ref().map(|[before, _]| before.clone());
         self.undone.push(step);
-        Restored { values, preset, alterations, links }
+        Restored { values, preset, alterations, links, file }
     }
 
     /// Does the last undone step again. `now`: see [`undo`](Self::undo).
@@ -235,8 +241,9 @@ impl UndoHistory {
         let preset = step.preset.as_ref().map(|[_, after]| after.clone());
         let alterations = step.moved.as_ref().map(|moved| moved.brought(now, &moved.after));
         let links = step.device.as_ref().map(|device| [device.before.clone(), device.after.clone()]);
+        let file = step.file.as_ref().map(|[_, after]| after.clone());
         self.done.push(step);
-        Restored { values, preset, alterations, links }
+        Restored { values, preset, alterations, links, file }
     }
 }
 

@@ -83,7 +83,7 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
 /// A list of choices to open, as wide as there is room. Its name is what a screen reader says, and tells it from its neighbours.
 pub fn list(ui: &mut Ui, name: &str, texts: &[String], chosen: &mut usize) -> Response {
     let text = texts.get(*chosen).cloned().unwrap_or_default();
-    let list = egui::ComboBox::from_id_salt(("list", name)).width(ui.available_width() - 8.0).truncate();
+    let list = egui::ComboBox::from_id_salt(("list", name)).width(ui.available_width()).truncate();
     let response = list.selected_text(&text).show_ui(ui, |ui| {
         for (index, text) in texts.iter().enumerate() {
             ui.selectable_value(chosen, index, text);
@@ -204,7 +204,10 @@ pub fn one_line(ui: &Ui, text: &str, font: FontId, ink: Color32, width: f32) -> 
 /// A heading between controls.
 pub fn heading(ui: &mut Ui, text: &str) {
     let c = Colours::here(ui);
-    ui.add_space(4.0);
+    // Above it, not before it in a row.
+    if ui.layout().is_vertical() {
+        ui.add_space(4.0);
+    }
     ui.label(egui::RichText::new(text).font(FontId::proportional(13.0)).color(c.ink).strong());
 }
 

@@ -33,12 +33,13 @@ impl PresetShelf {
         self.user.favourites.contains(name)
     }
 
-    /// The preset `by` places after the one called `name`, round and round; the first where there is no such.
-    pub fn beside(&self, name: &str, by: isize) -> Option<&Preset> {
-        let count = self.all().count();
-        let at = self.all().position(|preset| preset.name == name);
-        let next = at.map_or(0, |at| (at as isize + by).rem_euclid(count.max(1) as isize) as usize);
-        self.all().nth(next)
+    /// The preset `by` places after the one called `name` among those that are wanted, round and round; the first where there is no
+    /// such.
+    pub fn beside(&self, name: &str, by: isize, is_wanted: impl Fn(&Preset) -> bool) -> Option<&Preset> {
+        let wanted: Vec<&Preset> = self.all().filter(|preset| is_wanted(preset)).collect();
+        let at = wanted.iter().position(|preset| preset.name == name);
+        let next = at.map_or(0, |at| (at as isize + by).rem_euclid(wanted.len().max(1) as isize) as usize);
+        wanted.get(next).copied()
     }
 
     /// All tags, in the order in which they first appear.
@@ -63,9 +64,11 @@ mod tests {
         let user = UserPresets { presets: vec![mine], ..UserPresets::default() };
         let shelf = PresetShelf { user, ..PresetShelf::default() };
         let first = factory::all()[0].name.as_str();
-        let name = |of: &str, by| shelf.beside(of, by).unwrap().name.as_str();
+        let name = |of: &str, by| shelf.beside(of, by, |_| true).unwrap().name.as_str();
         assert_eq!((name(first, -1), name("Mine", 1), name("gone", 1)), ("Mine", first, first));
         assert_eq!(name(first, 1), factory::all()[1].name);
+        let jazz = |by| shelf.beside(first, by, |preset| preset.has_tag("jazz")).unwrap();
+        assert!(jazz(1).has_tag("jazz") && shelf.beside(first, 1, |_| false).is_none());
         assert!(shelf.is_users("Mine") && !shelf.is_users(first));
         assert_eq!(shelf.tags().last(), Some(&"new"));
     }

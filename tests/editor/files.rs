@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use chalumeau::editor::{Action, Tab};
-use chalumeau::folder_listing::FolderListing;
+use chalumeau::folder_listing::{FolderListing, Place};
 use egui::Key;
 use egui_kittest::kittest::Queryable;
 
@@ -16,11 +16,11 @@ fn names(names: &[&str]) -> Vec<String> {
 }
 
 /// The instrument view after a click on a button, with a folder to choose from.
-fn browsing(button: &str) -> Window {
+fn browsing(button: &str, first: Place) -> Window {
     let mut window = Window::tall(Tab::Instrument);
     window.harness.get_by_label(button).click();
     window.harness.run();
-    assert_eq!(window.actions(), [Action::ReadFolder(None)]);
+    assert_eq!(window.actions(), [Action::ReadFolder(first)]);
     window.snapshot.borrow_mut().folder = Arc::new(FolderListing {
         folder: PathBuf::from("/home/music"),
         folders: names(&["scales"]),
@@ -40,25 +40,34 @@ fn click(window: &mut Window, label: &str) -> Vec<Action> {
 
 #[test]
 fn an_instrument_file_is_found_by_its_folders() {
-    let mut window = browsing("Open an instrument file");
+    let mut window = browsing("Open an instrument file", Place::Instruments);
     for hidden in ["fifths.SCL", "notes.txt"] {
         assert!(window.harness.query_by_label(hidden).is_none(), "{hidden} is no instrument");
     }
-    assert_eq!(click(&mut window, "Up"), [Action::ReadFolder(Some(PathBuf::from("/home")))]);
+    assert_eq!(click(&mut window, "Up"), [Action::ReadFolder(Place::Folder(PathBuf::from("/home")))]);
     assert_eq!(
         click(&mut window, "scales/"),
-        [Action::ReadFolder(Some(PathBuf::from("/home/music/scales")))]
+        [Action::ReadFolder(Place::Folder(PathBuf::from("/home/music/scales")))]
     );
     assert_eq!(
         click(&mut window, "mine.toml"),
         [Action::OpenInstrument(PathBuf::from("/home/music/mine.toml"))]
     );
+    // The next time it begins where the last file was, and undo brings back what played before.
+    let opened = click(&mut window, "Open an instrument file");
+    assert_eq!(opened, [Action::ReadFolder(Place::Folder(PathBuf::from("/home/music")))]);
+    assert_eq!(click(&mut window, "Yours"), [Action::ReadFolder(Place::Instruments)]);
+    click(&mut window, "Cancel");
     window.harness.get_by_label("Open a scale");
+    let undone = click(&mut window, "Undo");
+    assert_eq!(undone, [Action::NameInstrumentFile(String::new())]);
+    let redone = click(&mut window, "Redo");
+    assert_eq!(redone, [Action::NameInstrumentFile("/home/music/mine.toml".to_owned())]);
 }
 
 #[test]
 fn a_scale_and_a_mapping_are_offered_and_equal_temperament_comes_back() {
-    let mut window = browsing("Open a scale");
+    let mut window = browsing("Open a scale", Place::Home);
     window.harness.get_by_label("from_a.kbm");
     assert!(window.harness.query_by_label("mine.toml").is_none());
     assert_eq!(
@@ -77,9 +86,9 @@ fn a_scale_and_a_mapping_are_offered_and_equal_temperament_comes_back() {
 
 #[test]
 fn a_typed_path_opens_a_file_or_a_folder_and_escape_leaves() {
-    let mut window = browsing("Open an instrument file");
+    let mut window = browsing("Open an instrument file", Place::Instruments);
     for (typed, wanted) in [
-        ("/tmp", Action::ReadFolder(Some(PathBuf::from("/tmp")))),
+        ("/tmp", Action::ReadFolder(Place::Folder(PathBuf::from("/tmp")))),
         // A project keeps it, and may be opened from another folder.
         ("mine.toml", Action::OpenInstrument(std::path::absolute("mine.toml").unwrap())),
     ] {
@@ -92,11 +101,11 @@ fn a_typed_path_opens_a_file_or_a_folder_and_escape_leaves() {
         window.harness.run();
         assert_eq!(window.actions(), [wanted]);
     }
-    let mut window = browsing("Open a scale");
+    let mut window = browsing("Open a scale", Place::Home);
     window.harness.key_press(Key::Escape);
     window.harness.run();
     window.harness.get_by_label("Open a scale");
-    let mut window = browsing("Open a scale");
+    let mut window = browsing("Open a scale", Place::Home);
     window.snapshot.borrow_mut().folder = Arc::new(FolderListing {
         refused: Some("cannot read /root: Permission denied".to_owned()),
         ..FolderListing::default()

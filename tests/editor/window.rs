@@ -715,7 +715,7 @@ fn a_program_without_a_host_lists_devices_and_starts_again_with_those_that_are_c
     assert!(window.harness.query_by_label("Restart with these").is_none(), "nothing else is chosen");
     choose(&mut window, "Play to", "Card");
     choose(&mut window, "Sample rate", "44100 Hz");
-    choose(&mut window, "Samples per block", "blocks of 128");
+    choose(&mut window, "Samples per block", "128 \u{b7} 3 ms");
     choose(&mut window, "MIDI from", "EWI");
     choose(&mut window, "Microphone", "Mic");
     assert!(!window.actions().iter().any(|action| matches!(action, Action::UseDevices(_))), "not yet");
@@ -833,7 +833,7 @@ fn nothing_to_show_is_shown_as_such() {
         let mut window = Window::new(tab, (700.0, 480.0));
         *window.snapshot.borrow_mut() = chalumeau::editor::Snapshot::default();
         window.harness.run();
-        window.harness.get_by_label_contains("Mouth pressure 0.00 kPa");
+        window.harness.get_by_label_contains(", from Breath");
     }
 }
 

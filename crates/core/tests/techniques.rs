@@ -83,6 +83,30 @@ fn way(heard: &[f64]) -> (f64, f64, f64, [f64; 2]) {
     (step, hz[0], hz[hz.len() - 1], [low, high])
 }
 
+/// The table of docs/techniques.md.
+#[test]
+fn the_voice_of_a_growl_is_as_loud_as_the_documents_say() {
+    let quiet = Settings { noise: 0.0, life: 0.0, ..Settings::default() };
+    let fixed = Techniques { growl: 1.0, growl_pitch: GrowlPitch::Fixed, ..Techniques::default() };
+    let below = Techniques { growl: 1.0, ..Techniques::default() };
+    for (written, techniques, breath, documented) in [
+        (60, below, 0.6, [-21.0, -35.0]),
+        (79, below, 0.6, [-26.0, -33.0]),
+        (64, fixed, 0.6, [-21.0, -28.0]),
+        (52, fixed, 0.6, [-19.0, -36.0]),
+        (79, below, 0.9, [-42.0, -40.0]),
+    ] {
+        let growled = held(&Settings { techniques, ..quiet }, written, breath);
+        let hz = sounding(written).frequency_hz(440.0);
+        let voice_hz = if techniques.growl_pitch == GrowlPitch::Fixed { 110.0 } else { 0.5 * hz };
+        let sides = [hz + voice_hz, (hz - voice_hz).abs()];
+        for (side_hz, wanted) in sides.into_iter().zip(documented) {
+            let side = level_db(&growled, side_hz) - level_db(&growled, hz);
+            assert!((side - wanted).abs() < 1.5, "{written} at {breath}: {side:.1} dB, {wanted} documented");
+        }
+    }
+}
+
 #[test]
 fn a_growl_puts_the_voice_beside_every_partial() {
     for (written, techniques, interval) in [

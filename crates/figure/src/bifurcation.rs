@@ -24,8 +24,10 @@ pub struct Ramp {
     pub begins: Option<f64>,
     /// Growing: the reed shuts for a part of each period.
     pub shuts: Option<f64>,
-    /// Growing: the note ends because the reed stays shut.
+    /// Growing: the note ends because the reed stays shut, or because another register takes over.
     pub chokes: Option<f64>,
+    /// It is another register.
+    pub gives_way: bool,
     /// Fading: it comes back.
     pub returns: Option<f64>,
     /// Fading: it ends.
@@ -74,7 +76,7 @@ impl Ramp {
             (self.threshold, "linear threshold", Colour::Ink),
             (self.begins, "begins", Colour::Blue),
             (self.shuts, "shuts in each period", Colour::Blue),
-            (self.chokes, "chokes", Colour::Blue),
+            (self.chokes, if self.gives_way { "gives way" } else { "chokes" }, Colour::Blue),
             (self.returns, "returns", Colour::Vermilion),
             (self.ends, "ends", Colour::Vermilion),
         ] {

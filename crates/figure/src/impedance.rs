@@ -71,13 +71,18 @@ pub fn fingering(about: &FingeringImpedance<'_>) -> Figure {
     let label = format!("whole multiples of {:.1} Hz, the note", about.sounding_hz);
     // Room above for the words of the modes.
     let magnitude = Axis::linear("|Z| / Zc, dB").range(low_db - 3.0, high_db + 16.0);
-    let mut upper = Panel::new("", axis(), magnitude).top(SecondAxis::named(label, harmonics)).weight(2.0);
+    let mut upper = Panel::new("", axis(), magnitude).weight(2.0);
+    // A narrow range may have none.
+    if harmonics.clone().next().is_some() {
+        upper = upper.top(SecondAxis::named(label, harmonics));
+    }
     let mut lower = Panel::new(
         "",
         axis(),
-        Axis::linear("phase, degrees")
-            .range(-95.0, 95.0)
-            .ticks([-90, -45, 0, 45, 90].map(|degrees| (f64::from(degrees), degrees.to_string()))),
+        Axis::linear("phase, degrees").range(-95.0, 95.0).ticks(
+            [-90, -45, 0, 45, 90]
+                .map(|degrees| (f64::from(degrees), degrees.to_string().replace('-', "\u{2212}"))),
+        ),
     );
     for (index, curve) in about.curves.iter().enumerate() {
         let (colour, dash, width) = if index == 0 {

@@ -82,7 +82,10 @@ impl Values {
     fn texts(self, name: &str) -> Result<Vec<String>, String> {
         let texts: Vec<_> = match self {
             Self::List(list) => list.into_iter().map(Scalar::text).collect(),
-            Self::Steps(Steps { steps: 1, from, .. }) => vec![from.to_string()],
+            Self::Steps(Steps { steps: 1, from, to }) if from == to => vec![from.to_string()],
+            Self::Steps(Steps { steps: 1, from, to }) => {
+                return Err(format!("{name}: from {from} to {to} are 2 steps or more, got 1"));
+            }
             Self::Steps(Steps { from, to, steps }) if (2..=FILES_MOST).contains(&steps) => (0..steps)
                 // Nine digits: the sum of steps is not to show its last bits.
                 .map(|step| from + (to - from) * step as f64 / (steps - 1) as f64)

@@ -56,7 +56,15 @@ impl<'a> BreathAndHaptics<'a> {
     /// Analyses the instrument (about 1 s). `near` is the written note to swell.
     pub fn new(prepared: &'a RenderJob, design: FeelDesign, near: Option<WrittenNote>) -> Self {
         let feels = InstrumentFeel::new(&prepared.model);
+        let (model, reach) = (&prepared.model, prepared.settings.reach);
+        let plays = |written: WrittenNote| {
+            let sounding = written.sounding(model.file.transposition);
+            sounding.is_some_and(|note| reach.fingering(note, model).is_some())
+        };
+        // A key that is silent because its note is out of tune does not speak.
         let asked = feels.requirements().with(&feels.reed(&prepared.settings));
+        let asked = feels.requirements().written().zip(asked);
+        let asked: Vec<_> = asked.map(|(written, asked)| asked.filter(|_| plays(written))).collect();
         let near = near.and_then(|near| feels.requirements().written().position(|written| written == near));
         let first = asked.iter().position(Option::is_some);
         let near = near.filter(|&near| asked[near].is_some()).or(first);

@@ -11,7 +11,7 @@ use crate::editor::theme::Colours;
 use crate::parameters::{Kind, Parameter, Value};
 
 /// Of the list of devices, points: all of them at once.
-const LIST_HEIGHT: f32 = 320.0;
+const LIST_HEIGHT: f32 = 360.0;
 
 /// What [`ANY_DEVICE`] does.
 const ANY_SHOWS: &str = "As in a new instance: keys blow by their velocity; CC2, CC11 or pressure takes over as soon as it moves.";
@@ -48,7 +48,7 @@ pub fn choose_device(ui: &mut Ui, hands: &mut Hands) {
     let all: Vec<ParameterLink> = links.all().into_iter().map(|(link, _)| link).collect();
     let c = Colours::here(ui);
     heading(ui, "Device");
-    let list = egui::ComboBox::from_id_salt("controllers of a device").width(ui.available_width() - 8.0);
+    let list = egui::ComboBox::from_id_salt("controllers of a device").width(ui.available_width());
     let maps = || std::iter::once(&*ANY_DEVICE).chain(factory::all());
     // Older projects do not say which one was chosen.
     let fitting = || maps().find(|map| is_set(hands, &all, map));
@@ -121,6 +121,9 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands) {
                     )
                     .labelled_by(word.id);
                 }
+            });
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
                 let word = ui.label(quiet("curve".to_owned()));
                 ui.add(DragValue::new(&mut link.curve).range(0.2..=5.0).speed(0.02).fixed_decimals(2))
                     .labelled_by(word.id);

@@ -21,7 +21,9 @@ const KEYS: KeySteps = KeySteps { share: 0.02, has_vertical: true };
 const ARC: (f32, f32) = (0.75 * std::f32::consts::PI, 2.25 * std::f32::consts::PI);
 const HOW: &str = "Drag up or down, or the arrow keys; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
 /// Size of the field for a typed value, points.
-const FIELD: Vec2 = vec2(84.0, 18.0);
+const FIELD: Vec2 = vec2(84.0, 24.0);
+/// Between an arc and the edge of its place: the tick at the default, and a gap, points.
+const CLEAR: f32 = 7.0;
 
 /// A main control.
 pub struct Macro {
@@ -87,11 +89,14 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
         (false, true) => 62.0 * grown,
         (false, false) => 56.0 * grown,
     };
-    let radius = 0.5 * (size.y - words);
-    let centre = pos2(rect.center().x, rect.top() + radius + 6.0);
+    // In a tall window the width is what there is least of; the rest of the height is above and below.
+    let most = 0.5 * (size.y - words);
+    let radius = most.min(0.5 * size.x - CLEAR);
+    let top = rect.top() + most - radius;
+    let centre = pos2(rect.center().x, top + radius + 6.0);
     paint(ui, c, centre, radius, &look, value, is_touched);
     let painter = ui.painter().clone();
-    let at = pos2(centre.x, rect.top() + 2.0 * radius + 10.0);
+    let at = pos2(centre.x, top + 2.0 * radius + 10.0);
     let font = FontId::proportional(if is_small { 13.0 } else { 14.0 * grown });
     let name = painter.text(at, Align2::CENTER_TOP, of.name, font, c.ink);
     let after = host_marks::paint(ui, &marks, name.right_center());
@@ -112,7 +117,13 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
     let value_response =
         ui.interact(of_value.expand2(vec2(4.0, 1.0)), response.id.with("value"), Sense::CLICK);
     if is_typing {
-        type_value(ui, hands, of.id, Rect::from_center_size(of_value.center(), FIELD), Align2::CENTER_CENTER);
+        type_value(
+            ui,
+            hands,
+            of.id,
+            Rect::from_center_size(of_value.center() + vec2(0.0, 3.0), FIELD),
+            Align2::CENTER_CENTER,
+        );
     } else {
         painter.galley(at, words, ink);
         let is_entered = response.clicked() && response.has_focus() && ui.input(pressed_enter);
@@ -123,13 +134,7 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
     value_response.on_hover_cursor(CursorIcon::Text);
     if has_ends && !is_typing {
         let at = pos2(centre.x, bottom + 1.0);
-        painter.text(
-            at,
-            Align2::CENTER_TOP,
-            of.ends,
-            theme::small_grown(grown),
-            c.quiet.gamma_multiply(0.85),
-        );
+        painter.text(at, Align2::CENTER_TOP, of.ends, theme::small_grown(grown), c.quiet);
     }
     response.widget_info(|| {
         let mut info = WidgetInfo::slider(ui.is_enabled(), f64::from(value), of.name);

@@ -40,6 +40,10 @@ const MOST_GROWN: f32 = 2.5;
 const MOST_EXAGGERATED: f32 = 2.4;
 /// Steps along the bore that the outline has.
 const STATIONS: usize = 160;
+/// The reed over the length of the mouthpiece.
+const REED_SHARE: f64 = 0.78;
+/// Height of the hint at the lower edge, points.
+const HINT: f32 = 30.0;
 /// How far a finger or pad lifts, points.
 const LIFT: f32 = 9.0;
 /// Level at which the picture's light begins, and where it is full, dBFS.
@@ -78,7 +82,9 @@ pub fn draw(
         let painter = ui.painter_at(rect);
         body.wave(&painter, c, &snapshot.standing, rect, loudness, grown);
         let size = vec2(1.04 * body.length(), 0.9 * body.thickness());
-        let under = pos2(body.middle(), body.axis + 1.9 * body.thickness());
+        // Above the hint at the lower edge.
+        let low = rect.bottom() - HINT - 0.5 * size.y;
+        let under = pos2(body.middle(), (body.axis + 1.9 * body.thickness()).min(low));
         shadow(&painter, Rect::from_center_size(under, size), 0.28);
         body.paint(&painter, c, motion.reed(), chart::share(snapshot.mouth_now_kpa() / 3.0));
         body.rods(&painter, c);
@@ -285,8 +291,11 @@ impl<'a> Body<'a> {
         self.reed(painter, c, reed);
         for share in [0.52, 0.64, 0.76] {
             let x = self.x(share * mouthpiece_m);
-            let (half, out) = (3.0 * self.grown, self.outside(share * mouthpiece_m) + 2.5 * self.grown);
-            band(painter, self.axis, x - half..=x + half, out, c.metal);
+            let upper = self.axis - self.outside(share * mouthpiece_m) - 2.5 * self.grown;
+            // Around the reed, too.
+            let lower = self.reed_below(share * mouthpiece_m) + 2.0 * self.grown;
+            let half = 3.0 * self.grown;
+            band(painter, 0.5 * (upper + lower), x - half..=x + half, 0.5 * (lower - upper), c.metal);
         }
         if breath > 0.0 {
             glow(
@@ -298,10 +307,17 @@ impl<'a> Body<'a> {
         }
     }
 
+    /// Lower edge of the reed on the mouthpiece, where the ligature holds it.
+    fn reed_below(&self, x_m: f64) -> f32 {
+        let end_m = REED_SHARE * self.mouthpiece_end_m();
+        let along = ((x_m / end_m - 0.4) / 0.6).clamp(0.0, 1.0) as f32;
+        self.axis + self.outside(x_m) + 1.5 + (0.10 + 0.06 * along) * self.thickness()
+    }
+
     /// The reed on the lower side of the mouthpiece; its tip moves.
     fn reed(&self, painter: &Painter, c: &Colours, opening: f32) {
         let mouthpiece_m = self.mouthpiece_end_m();
-        let end_m = 0.78 * mouthpiece_m;
+        let end_m = REED_SHARE * mouthpiece_m;
         let lower = |x_m: f64| self.axis + self.outside(x_m);
         let tip = pos2(self.x(0.0) - 1.0, self.axis + self.outside(0.0) + self.grown * (1.0 + 3.5 * opening));
         let heel = pos2(self.x(end_m), lower(end_m) + 1.5);

@@ -19,6 +19,9 @@ const LOUDEST_OF_S: f32 = 1.0;
 /// Time in which a note finds its pitch, s.
 const ATTACK_S: f32 = 0.08;
 
+/// A change of fingers, s: shorter than the notes of the quickest ornament.
+const CHANGE_S: f32 = 0.06;
+
 /// The pitches that were played: those of attacks and decays are left out. An attack follows a pause.
 fn played(track: &Track) -> Vec<Option<f32>> {
     let count = track.level_db.len().min(track.pitch.len());
@@ -33,7 +36,32 @@ fn played(track: &Track) -> Vec<Option<f32>> {
     let sounding: Vec<_> = (0..count).map(pitch).collect();
     let is_past_attack =
         |index: usize| sounding[index.saturating_sub(attack)..index].iter().all(Option::is_some);
-    (0..count).map(|index| sounding[index].filter(|_| is_past_attack(index))).collect()
+    let mut played: Vec<_> =
+        (0..count).map(|index| sounding[index].filter(|_| is_past_attack(index))).collect();
+    forget_changes(&mut played, steps(CHANGE_S));
+    played
+}
+
+/// Forgets pitches that are in force for `steps` at most, and outside of what is before and after: while fingers move, the air column
+/// has a pitch that nobody plays.
+fn forget_changes(played: &mut [Option<f32>], steps: usize) {
+    let is_one = |a: &Option<f32>, b: &Option<f32>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() < 1.0,
+        _ => a.is_none() && b.is_none(),
+    };
+    let stretches: Vec<_> = played.chunk_by(is_one).map(|of| (of.len(), of[0], of[of.len() - 1])).collect();
+    let mut begin = 0;
+    for (at, &(length, first, _)) in stretches.iter().enumerate() {
+        let before = at.checked_sub(1).and_then(|before| stretches[before].2);
+        let after = stretches.get(at + 1).and_then(|after| after.1);
+        if let (Some(before), Some(pitch), Some(after)) = (before, first, after)
+            && length <= steps
+            && (pitch < before.min(after) - 1.0 || pitch > before.max(after) + 1.0)
+        {
+            played[begin..begin + length].fill(None);
+        }
+        begin += length;
+    }
 }
 
 /// Draws the trail into all of the place; its words are `grown` times as large as in a window of the usual size.
@@ -130,5 +158,25 @@ mod tests {
         };
         let shown = [vec![None; 14], vec![Some(60.0); 50], vec![Some(64.0); 55], vec![None; 15]].concat();
         assert_eq!(played(&track), shown);
+    }
+
+    #[test]
+    fn a_pitch_between_two_notes_that_lies_outside_them_is_left_out() {
+        let line = |pitches: &[(f32, usize)]| -> Vec<Option<f32>> {
+            pitches.iter().flat_map(|&(pitch, count)| vec![Some(pitch); count]).collect()
+        };
+        for (heard, is_left_out) in [
+            ([(60.0, 20), (41.0, 2), (62.0, 20)], true),
+            ([(60.0, 20), (79.0, 3), (62.0, 20)], true),
+            // A note of an ornament, and a slide.
+            ([(60.0, 20), (62.0, 4), (60.0, 20)], false),
+            ([(60.0, 20), (61.5, 2), (63.0, 20)], false),
+        ] {
+            let mut played = line(&heard);
+            forget_changes(&mut played, 3);
+            let kept = played.iter().filter(|pitch| pitch.is_some()).count();
+            let wanted = if is_left_out { 40 } else { line(&heard).len() };
+            assert_eq!(kept, wanted, "{heard:?}");
+        }
     }
 }

@@ -8,6 +8,7 @@ use std::sync::{Arc, RwLock};
 use nice_plug::prelude::*;
 
 use super::entry::{choice, choice_from, status, whole};
+use crate::editor::snapshot::USER_FILE;
 use crate::plugin::launch_options::LaunchOptions;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::instrument::prepare::Quality;
@@ -119,7 +120,7 @@ impl InstrumentParams {
     pub fn key(&self) -> String {
         match self.choice.value() {
             InstrumentChoice::User => {
-                format!("user:{}", self.file.read().map_or_else(|_| String::new(), |path| path.clone()))
+                self.file.read().map_or_else(|_| USER_FILE.to_owned(), |path| format!("{USER_FILE}{path}"))
             }
             bundled => bundled.id().to_owned(),
         }

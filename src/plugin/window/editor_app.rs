@@ -100,11 +100,9 @@ impl WindowMemory {
             }
             Action::FindFingerings(question) => shared.find_fingerings(question),
             Action::ChooseInstrument(index) => self.choose("instr", index, InstrumentChoice::ALL.len(), gui),
+            Action::NameInstrumentFile(path) => self.name_instrument_file(path),
             Action::OpenInstrument(path) => {
-                if let Ok(mut file) = self.handles.params.instrument.file.write() {
-                    *file = path.display().to_string();
-                }
-                self.handles.params.host.state_changed();
+                self.name_instrument_file(path.display().to_string());
                 let user = InstrumentChoice::ALL.len() - 1;
                 self.choose("instr", user, InstrumentChoice::ALL.len(), gui);
             }
@@ -158,6 +156,13 @@ impl WindowMemory {
     }
 
     /// Sets a choice parameter to value `index` of `count`, as the user would.
+    fn name_instrument_file(&self, path: String) {
+        if let Ok(mut file) = self.handles.params.instrument.file.write() {
+            *file = path;
+        }
+        self.handles.params.host.state_changed();
+    }
+
     fn choose(&self, id: &str, index: usize, count: usize, gui: &GuiContext) {
         let controls = self.controls.with(gui);
         controls.begin(id);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::editor::Snapshot;
-use crate::folder_listing::FolderListing;
+use crate::folder_listing::{FolderListing, Place};
 use crate::output::{NewFile, OutputError};
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -14,8 +14,8 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 /// What the window asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FileTask {
-    /// List a folder; `None` is the user's own.
-    ReadFolder(Option<PathBuf>),
+    /// List a folder.
+    ReadFolder(Place),
     /// Take the scale or the keyboard mapping of a file.
     OpenScale(PathBuf),
     /// Save an instrument beside the user's others.
@@ -27,16 +27,22 @@ pub enum FileTask {
 pub struct FilesRead {
     folder: Arc<FolderListing>,
     scale_refused: Option<String>,
-    saved: Option<Result<PathBuf, String>>,
+    /// What names the instrument that was saved as it was altered, and where it is, or why it is not.
+    saved: Option<(String, Result<PathBuf, String>)>,
 }
 
 impl FilesRead {
     /// Does what the window asks for. Waits for the disk.
     pub fn act(&mut self, task: FileTask, params: &ChalumeauParams) {
         match task {
-            FileTask::ReadFolder(path) => {
-                let usual = dirs::home_dir().unwrap_or_else(|| PathBuf::from("/"));
-                self.folder = Arc::new(FolderListing::read(&path.unwrap_or(usual)));
+            FileTask::ReadFolder(place) => {
+                let home = || dirs::home_dir().unwrap_or_else(|| PathBuf::from("/"));
+                let folder = match place {
+                    Place::Home => home(),
+                    Place::Instruments => instruments().filter(|folder| folder.is_dir()).unwrap_or_else(home),
+                    Place::Folder(folder) => folder,
+                };
+                self.folder = Arc::new(FolderListing::read(&folder));
             }
             FileTask::OpenScale(path) => match params.scale.saved().with_file(&path) {
                 Ok(scale) => {
@@ -47,11 +53,11 @@ impl FilesRead {
                 Err(refused) => self.scale_refused = Some(refused),
             },
             FileTask::SaveInstrument(file) => {
-                let folder = crate::data_folder::folder().map(|folder| folder.join("instruments"));
-                self.saved = Some(match folder {
+                let saved = match instruments() {
                     Some(folder) => save(&file, &folder),
                     None => Err("this system has no folder for instrument files".to_owned()),
-                });
+                };
+                self.saved = Some((params.instrument.key(), saved));
             }
         }
     }
@@ -60,8 +66,14 @@ impl FilesRead {
     pub fn show(&self, snapshot: &mut Snapshot) {
         snapshot.folder = self.folder.clone();
         snapshot.scale_refused.clone_from(&self.scale_refused);
-        snapshot.saved.clone_from(&self.saved);
+        let of_this = self.saved.as_ref().filter(|(key, _)| *key == snapshot.instrument_key);
+        snapshot.saved = of_this.map(|(_, saved)| saved.clone());
     }
+}
+
+/// The folder in which instruments are saved.
+fn instruments() -> Option<PathBuf> {
+    crate::data_folder::folder().map(|folder| folder.join("instruments"))
 }
 
 /// Most files with one name and a number.
@@ -119,7 +131,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fifths.scl");
         std::fs::write(&path, "fifths\n1\n3/2\n").unwrap();
-        read.act(FileTask::ReadFolder(Some(folder.path().to_owned())), &params);
+        read.act(FileTask::ReadFolder(Place::Folder(folder.path().to_owned())), &params);
         read.act(FileTask::OpenScale(path), &params);
         let mut snapshot = Snapshot::default();
         read.show(&mut snapshot);

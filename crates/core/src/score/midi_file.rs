@@ -51,6 +51,14 @@ pub enum MidiFileError {
     /// The header gives no ticks.
     #[error("MIDI header gives 0 ticks per beat or frame; expected 1 or more, usually 480 or 960")]
     NoTicks,
+    /// A tempo says that a beat takes no time.
+    #[error("MIDI track {track} has a tempo of 0 us for a beat at tick {tick}, in which no time would pass")]
+    Tempo {
+        /// Track, counted from 1.
+        track: usize,
+        /// Since the beginning.
+        tick: u64,
+    },
     /// The file ends before a chunk does.
     #[error(
         "MIDI file ends at byte {end}, but the chunk at byte {start} should go on to byte {wanted}; is it a whole file?"
@@ -190,6 +198,9 @@ pub fn read_parts(parts: &mut Parts, bytes: &[u8], rate: u32) -> Result<Score<Pa
         let decoded = match message.kind {
             TrackEventKind::Midi { channel, message } => decode(parts, channel.as_int(), message),
             TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
+                if us.as_int() == 0 {
+                    return Err(MidiFileError::Tempo { track: message.track + 1, tick: message.tick });
+                }
                 clock.set_tempo(us.as_int());
                 &[]
             }
