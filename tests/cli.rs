@@ -1445,7 +1445,67 @@ fn a_scale_that_leads_out_of_the_instrument_is_told() {
     fs::write(d.path().join("keys.mid"), one_after_another(&[60, 61, 66, 90])).unwrap();
     let output = chalumeau(d.path(), words("render keys.mid --scl fifths.scl --out x.wav"));
     let message = String::from_utf8(output.stderr).unwrap();
-    assert!(message.contains("2 notes have no fingering and stay silent"), "{message}");
+    assert!(message.contains("1 note has no fingering and stays silent (F#7)"), "{message}");
+    assert!(
+        message.contains("gives 1 key no pitch within the range of MIDI, and it stays silent (F#6)"),
+        "{message}"
+    );
+}
+
+/// A MIDI file with these messages and their delta times.
+fn with_messages(messages: &[u8]) -> Vec<u8> {
+    one_track(&[messages, &[0, 0xFF, 0x2F, 0]])
+}
+
+#[test]
+fn notes_without_length_and_a_tempo_without_time_are_told() {
+    let d = tempfile::tempdir().unwrap();
+    // A note of no length, and one that is heard.
+    let notes = [0, 0x90, 60, 64, 0, 0x80, 60, 0, 96, 0x90, 62, 64, 96, 0x80, 62, 0];
+    fs::write(d.path().join("brief.mid"), with_messages(&notes)).unwrap();
+    let output = chalumeau(d.path(), words("render brief.mid --out x.wav"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("1 note is never heard: no time lies between beginning and end"), "{message}");
+    // Of a chord, the last is heard.
+    let chord = [0, 0x90, 60, 64, 0, 0x90, 62, 64, 96, 0x80, 60, 0, 0, 0x80, 62, 0];
+    fs::write(d.path().join("chord.mid"), with_messages(&chord)).unwrap();
+    let output = chalumeau(d.path(), words("render chord.mid --out x.wav --force"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("1 note is never heard: another begins in the same moment"), "{message}");
+    let stopped = [&[0, 0xFF, 0x51, 3, 0, 0, 0], &notes[..]].concat();
+    fs::write(d.path().join("stopped.mid"), with_messages(&stopped)).unwrap();
+    let output = chalumeau(d.path(), words("render stopped.mid --out y.wav"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("track 1 has a tempo of 0 us for a beat at tick 0"), "{message}");
+    assert!(!output.status.success() && !d.path().join("y.wav").exists());
+}
+
+#[test]
+fn a_room_dies_away_before_the_file_ends() {
+    let d = tempfile::tempdir().unwrap();
+    let length = |more: &str| {
+        let line = format!(
+            "render --written C4 --seconds 0.2 --room 0.5 --room-decay 0.8 --out x.wav --force{more}"
+        );
+        let output = chalumeau(d.path(), words(&line));
+        let message = String::from_utf8(output.stderr).unwrap();
+        message.lines().find(|line| line.starts_with("x.wav: ")).expect(&message).to_owned()
+    };
+    assert!(length("").starts_with("x.wav: 1.000 s"), "{}", length(""));
+    assert!(length(" --tail 0").starts_with("x.wav: 0.200 s"));
+}
+
+#[test]
+fn a_report_warns_as_a_rendering_does() {
+    let d = tempfile::tempdir().unwrap();
+    let line = "report --written C4 --gamma 2.5 --seconds 0.7 --vibrato-rate 6 --out x.html";
+    let output = chalumeau(d.path(), words(line));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("warning: no tone is heard"), "{message}");
+    assert!(message.contains("--vibrato-rate has no effect"), "{message}");
+    let page = fs::read_to_string(d.path().join("x.html")).unwrap();
+    let row = page.split("C#7</").nth(1).expect("C#7 is in the table of pressures");
+    assert!(row[..row.find("</tr>").unwrap()].contains("never"), "a silent key does not speak");
 }
 
 #[test]

@@ -59,6 +59,10 @@ def test_feel_and_torque_are_those_of_the_command_line(table):
     for name in ("a_on_deg", "a_off_deg", "a_close_deg", "scale_mnm", "h", "k"):
         assert feel[name] == pytest.approx(said[name][0], abs=1e-4), name
     assert feel["most_mnm"] == pytest.approx(said["most_mnm"][0], abs=6e-3)
+    assert feel["wall_deg"] == pytest.approx(said["wall_deg"][0], abs=1e-4)
+    # The step at the threshold is no friction.
+    asked = chalumeau.feel("G4", law="pressure", detent=7)
+    assert asked["detent_mnm"] == pytest.approx(7.0) and asked["friction_mnm"] == feel["friction_mnm"] < 7
     curve = table("haptic", "--written", "G4", "--law", "pressure", "--curve")
     torques = chalumeau.torque("G4", curve["angle_deg"], law="pressure")
     np.testing.assert_allclose(torques, curve["torque_mnm"], atol=1e-5)
@@ -79,6 +83,8 @@ def test_reed_tables_and_flow_are_those_of_the_command_line(table):
     tables = chalumeau.reed_tables()
     for name, column in (("p", "p"), ("x_a", "x_a"), ("x_b", "x_b"), ("sgn", "sgn")):
         np.testing.assert_allclose(tables[name], said[column], rtol=1e-15, err_msg=name)
+    pressures = np.linspace(-1, 1, 9)
+    np.testing.assert_allclose(chalumeau.reed_flow(pressures, A=2), 2 * chalumeau.reed_flow(pressures))
     law = table("reed", "--law", "--H", "3", "--k", "0.3849")
     np.testing.assert_allclose(chalumeau.reed_flow(law["p"], H=3, k=0.3849), law["u"], rtol=1e-12, atol=1e-12)
 

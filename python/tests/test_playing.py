@@ -82,6 +82,57 @@ def test_events_are_played_at_their_samples():
     assert (played == np.concatenate([first, live.render(0.1)])).all()
 
 
+def pitch_hz(samples, near):
+    """Frequency of a steady tone within a semitone of another, by its autocorrelation some periods away."""
+    periods = 20
+    middle = round(periods * 48_000 / near)
+    half = middle // periods // 2 - 1
+    lags = np.arange(middle - half, middle + half)
+    samples = samples.astype(float)
+    values = [np.dot(samples[:-lag], samples[lag:]) / (len(samples) - lag) for lag in lags]
+    top = int(np.argmax(values))
+    a, b, c = values[top - 1 : top + 2]
+    return periods * 48_000 / (lags[top] + (a - c) / (2 * (a - 2 * b + c)))
+
+
+def test_what_is_done_to_a_live_clarinet_is_heard():
+    held = [(0.0, "breath", 0.6), (0.0, "note_on", "Bb3", 0.7)]
+    still = {"noise": 0, "life": 0}
+
+    def played(*events, **settings):
+        return chalumeau.Clarinet(settings=still | settings).play([*held, *events], 0.8)
+
+    plain = played()
+    steady = slice(24_000, None)
+    near = 233.08
+
+    def cents(samples):
+        return 1_200 * np.log2(pitch_hz(samples[steady], near) / pitch_hz(plain[steady], near))
+
+    # Settings: as from the start, and from the moment on.
+    assert (played((0.0, "set", {"lip": 1.1})) == played(lip=1.1)).all()
+    later = played((0.4, "set", {"lip": 1.3}))
+    assert (later[:19_000] == plain[:19_000]).all() and (later[20_000:] != plain[20_000:]).any()
+    assert abs(cents(played((0.0, "bend", 40.0))) - 40) < 3 and abs(cents(played((0.0, "bend", -40.0))) + 40) < 3
+    # The holes from the reed: one that is opened far up raises the note, its neighbour by another amount.
+    holes = [name for name, *_ in chalumeau.instrument("b-flat").holes()]
+    opened = [played((0.0, "hole", hole, 1.0)) for hole in holes[5:8]]
+    levels = {digest(one) for one in opened} | {digest(plain)}
+    assert len(levels) == 4, "each hole is one of its own"
+    back = played((0.3, "hole", holes[5], 1.0), (0.31, "hole", holes[5], None))
+    assert abs(cents(back)) < 1
+    # A slap sounds without breath, the harder the louder.
+    soft, hard = (np.abs(chalumeau.Clarinet(settings=still).play([(0.0, "slap", s)], 0.2)).max() for s in (0.2, 1.0))
+    assert hard > 1.5 * soft > 0
+    clarinet = chalumeau.Clarinet(settings=still)
+    clarinet.play(held, 0.4)
+    clarinet.panic()
+    clarinet.render(0.5)
+    assert np.abs(clarinet.render(0.1)).max() < 1e-4
+    clarinet.reset()
+    assert (clarinet.play(held, 0.8) == plain).all(), "as a new one"
+
+
 def test_notes_and_the_same_notes_live_are_the_same():
     listed = chalumeau.render([(0.0, 0.2, "C4", 0.6), (0.2, 0.2, "D4", 0.6)], tail=0.1)
     events = [

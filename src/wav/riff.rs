@@ -81,7 +81,7 @@ mod tests {
 
     /// A file of three samples of 16 bits, with other chunks before them, and this length written before them.
     fn file(before: &[u8], length: u32) -> Vec<u8> {
-        let format = [1_u16, 1, 48_000, 0, 31_072, 1, 2, 16].map(u16::to_le_bytes).concat();
+        let format = [1_u16, 1, 48_000, 0, 30_464, 1, 2, 16].map(u16::to_le_bytes).concat();
         let samples = [100_i16, -200, 300].map(i16::to_le_bytes).concat();
         let data = [&b"data"[..], &length.to_le_bytes(), &samples].concat();
         let chunks = [before.to_vec(), chunk(b"fmt ", &format), data].concat();

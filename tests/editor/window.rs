@@ -833,7 +833,7 @@ fn nothing_to_show_is_shown_as_such() {
         let mut window = Window::new(tab, (700.0, 480.0));
         *window.snapshot.borrow_mut() = chalumeau::editor::Snapshot::default();
         window.harness.run();
-        window.harness.get_by_label_contains(", from Breath");
+        window.harness.get_by_label_contains("at rest");
     }
 }
 

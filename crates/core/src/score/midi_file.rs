@@ -199,7 +199,7 @@ pub fn read_parts(parts: &mut Parts, bytes: &[u8], rate: u32) -> Result<Score<Pa
             TrackEventKind::Midi { channel, message } => decode(parts, channel.as_int(), message),
             TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
                 if us.as_int() == 0 {
-                    return Err(MidiFileError::Tempo { track: message.track + 1, tick: message.tick });
+                    return Err(MidiFileError::Tempo { track: message.track, tick: message.tick });
                 }
                 clock.set_tempo(us.as_int());
                 &[]
