@@ -98,6 +98,8 @@ MOST_DEPTH = 4
 SILENCE_S = 3.0
 # From 0 to the default ceiling in 250 ms, the time in which a knob arms.
 RISE_MNM_S = 400.0
+# A turn counts as no longer than this: a program that was suspended does not make up for it.
+LONGEST_TURN_S = 0.05
 # libmapper looks for a free name for about a second.
 READY_S = 15.0
 CEILING_MNM = (100.0, 250.0)
@@ -308,7 +310,7 @@ class Bridge:
         rising = self.scale["wanted"] > self.scale["sent"]
         values, self.fresh = self.fresh, {}
         if "scale" in values or rising:
-            sent = min(self.scale["wanted"], self.scale["sent"] + RISE_MNM_S * dt_s) if self.is_felt else 0.0
+            sent = min(self.scale["wanted"], self.scale["sent"] + RISE_MNM_S * min(dt_s, LONGEST_TURN_S)) if self.is_felt else 0.0
             self.scale["sent"] = values["scale"] = sent
         return values
 

@@ -241,6 +241,22 @@ def an_error_switches_torque_off():
     assert said == [dict.fromkeys(libmapper_bridge.TORQUE, 0.0), "free"], said
 
 
+def torque_rises_by_400_mnm_a_second():
+    limits = libmapper_bridge.limits_for(100.0, libmapper_bridge.torquetuner(208.0))
+    bridge = libmapper_bridge.Bridge(limits)
+    bridge.take(bundle(**PLAYED), 0.0)
+    wanted, sent, turns = bridge.scale["wanted"], 0.0, 0
+    assert wanted > 40
+    while sent < wanted:
+        now = bridge.due(0.01 * turns, 0.01)["scale"]
+        assert sent < now <= sent + 4.0 + 1e-9 and turns < 100, (sent, now)
+        sent, turns = now, turns + 1
+    # A program that stood still for a second goes on as slowly.
+    bridge.off()
+    bridge.take(bundle(**PLAYED), 1.0)
+    assert bridge.due(1.0, 1.0)["scale"] <= 20.0
+
+
 def what_chalumeau_says_at_the_end_is_passed_on_at_once():
     """The bundle that Chalumeau sends when the knob is let go, as crates/knob/src/device/feel_osc.rs makes it."""
     limits = libmapper_bridge.limits_for(100.0, libmapper_bridge.torquetuner(208.0))
@@ -430,6 +446,7 @@ TESTS = [
     feel_reaches_a_torquetuner_in_its_units,
     every_end_but_a_kill_switches_torque_off,
     an_error_switches_torque_off,
+    torque_rises_by_400_mnm_a_second,
     what_chalumeau_says_at_the_end_is_passed_on_at_once,
     silence_switches_torque_off,
     a_knob_that_comes_back_is_mapped_again,

@@ -142,6 +142,22 @@ CLAIM(fault_3_the_slap_region_does_not_jump_and_its_event_tells_the_peak_speed) 
     const float speed = 9.0F * 2000.0F / 3600.0F * 6.2831853F;
     CHECK(slap != nullptr && std::fabs(slap->value - speed) < 0.02F * speed);
     CHECK((bench.state.flags & flag::SLAP) == 0);
+    // A hand that trembles at the edge slaps once, when it has left.
+    bench.turn_to(-1005, 2);
+    for (int i = 0; i < 20; ++i) {
+        bench.turn_to(i % 2 == 0 ? -995 : -1005, 2);
+    }
+    CHECK(bench.state.slaps == static_cast<std::uint8_t>(before + 1));
+    bench.turn_to(-900, 2);
+    CHECK(bench.state.slaps == static_cast<std::uint8_t>(before + 2));
+    // A zero that is set within the region is no way out of it.
+    bench.turn_to(-1300, 9);
+    bench.send(Type::Free, Payload{});
+    bench.run(1);
+    bench.send(Type::Zero, Zero{0}.encode());
+    bench.run(1);
+    bench.turn_to(-1200, 2);
+    CHECK(bench.state.angle > 900 && bench.state.slaps == static_cast<std::uint8_t>(before + 2));
 }
 
 CLAIM(fault_4_a_knob_let_go_past_closure_meets_a_wall) {

@@ -117,6 +117,13 @@ class Bench {
         arm(ceiling);
         run(600);
     }
+    std::size_t count(EventKind kind) const {
+        std::size_t found = 0;
+        for (const Event& event : events) {
+            found += event.kind == static_cast<std::uint8_t>(kind) ? 1U : 0U;
+        }
+        return found;
+    }
     const Event* last(EventKind kind) const {
         for (std::size_t i = events.size(); i-- > 0;) {
             if (events[i].kind == static_cast<std::uint8_t>(kind)) {

@@ -346,6 +346,10 @@ CLAIM(rule_4_a_ceiling_falls_at_once_and_rises_at_5_nm_per_s) {
     bench.run(2000);
     const Event* limit = bench.last(EventKind::Limit);
     CHECK(limit != nullptr && std::fabs(limit->value + 100.0F) < 0.1F);
+    // It is told once a second, while it limits 2000 ticks a second.
+    const std::size_t told = bench.count(EventKind::Limit);
+    bench.run(4000);
+    CHECK(bench.count(EventKind::Limit) - told <= 2);
     // ALIVE does not raise it again, nor does an ARM that came before.
     const Arm before = bench.permission(SESSION, 450);
     bench.ceiling_mnm = 450;
