@@ -96,7 +96,7 @@ fn staircase(written: u8) -> Vec<(f64, f64)> {
 fn equal_steps_of_breath_are_equal_steps_of_level_in_tune() {
     let notes: Vec<u8> = NOTES.collect();
     let stairs = each(notes.len(), |n| staircase(notes[n]));
-    let (mut least_range, mut steps, mut off) = (f64::INFINITY, (f64::INFINITY, 0.0_f64), 0.0_f64);
+    let (mut ranges, mut steps, mut off) = ((f64::INFINITY, 0.0_f64), (f64::INFINITY, 0.0_f64), 0.0_f64);
     for (written, stair) in notes.iter().zip(&stairs) {
         let range = stair[stair.len() - 1].0 - stair[0].0;
         let mean = range / (stair.len() - 1) as f64;
@@ -104,15 +104,16 @@ fn equal_steps_of_breath_are_equal_steps_of_level_in_tune() {
         let own = own.fold((f64::INFINITY, 0.0_f64), |(low, high), step| (low.min(step), high.max(step)));
         let own_off = stair.iter().map(|(_, cents)| cents.abs()).fold(0.0, f64::max);
         println!("written {written}: {range:.1} dB, steps {:.2}..{:.2}, {own_off:.1} cents", own.0, own.1);
-        least_range = least_range.min(range);
+        ranges = (ranges.0.min(range), ranges.1.max(range));
         steps = (steps.0.min(own.0), steps.1.max(own.1));
         off = off.max(own_off);
     }
     println!(
-        "least range {least_range:.1} dB, steps {:.2}..{:.2} of the mean, {off:.1} cents",
-        steps.0, steps.1
+        "range {:.1} to {:.1} dB, steps {:.2}..{:.2} of the mean, {off:.1} cents",
+        ranges.0, ranges.1, steps.0, steps.1
     );
-    assert!(least_range > 24.0);
+    // 27 dB from 4 on (docs/guide/midi.md), of which one lies below 8.
+    assert!(ranges.0 > 25.5 && ranges.1 < 27.0, "{ranges:?} dB");
     assert!(steps.0 > 0.5 && steps.1 < 2.0);
     assert!(off < 3.0);
 }
