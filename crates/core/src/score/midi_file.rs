@@ -491,7 +491,7 @@ mod tests {
             let hands = if below(2.0) == 0 { Hands::OfAll } else { Hands::OfTrack };
             let mut held: [HashMap<KeyOf, bool>; 2] = Default::default();
             if let Some((key, _)) = fast.first().and_then(|first| key_of(first, hands)) {
-                held.iter_mut().for_each(|held| drop(held.insert(key, true)));
+                held.iter_mut().for_each(|held| held.extend([(key, true)]));
             }
             end_before_beginning(&mut fast, hands, &mut held[0]);
             ends_moved(&mut slow, hands, &mut held[1]);
