@@ -23,7 +23,8 @@ const NO_ODD_DB: f64 = -60.0;
 /// Whether it is a note above the highest pitch, found an octave too low: twice its period is within the range, and it has no odd
 /// harmonics then.
 fn is_beyond(note: &Note) -> bool {
-    2.0 * note.f0_hz > HIGHEST_HZ && note.levels_db.iter().step_by(2).all(|level| level.is_nan() || *level <= NO_ODD_DB)
+    2.0 * note.f0_hz > HIGHEST_HZ
+        && note.levels_db.iter().step_by(2).all(|level| level.is_nan() || *level <= NO_ODD_DB)
 }
 
 /// A note whose lowest harmonics all lie below this is the common period of several, dB re the strongest (by judgement; a clarinet's

@@ -251,7 +251,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("damp", EMBOUCHURE, "Lip damping", number([0.2, 2.0], 1.0, 2, " x"))
         .help(
             "Damping of the reed by the lip, relative to a normal embouchure",
-            "At low values the reed squeaks. At high values the sound is dark and the reed does not squeak easily.",
+            "At low values the reed squeaks. At high values the sound is dark and the reed does not squeak easily. Between written C6 and E flat 6 its effect fades: a damped reed cannot hold higher notes.",
             "",
         )
         .sets(Sets::Number(SettingNumber::Damping))

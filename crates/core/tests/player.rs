@@ -263,6 +263,43 @@ fn a_hard_attack_begins_louder_and_goes_on_as_any() {
     }
 }
 
+/// As in the presets *Glass facing*, *Keys, bright tongue* and *Doina*.
+#[test]
+fn slurs_down_over_the_break_arrive_on_straighter_facings_and_freer_reeds() {
+    let reeds = [
+        Settings { lay: 0.0, strength: 3.5, zeta: 0.4, damping: 1.1, ..still() },
+        Settings { lay: 0.3, strength: 3.0, zeta: 0.36, legato_ms: 7.0, ..still() },
+        Settings { strength: 2.25, lip: 1.05, damping: 0.9, legato_ms: 12.0, breath_curve: 1.4, ..still() },
+    ];
+    let mut slurs = Vec::new();
+    for reed in 0..reeds.len() {
+        for velocity in [0.16, 0.31, 0.47, 0.87_f32] {
+            slurs.extend((71..78).flat_map(|from| (59..67).map(move |to| (reed, velocity, from, to))));
+        }
+    }
+    let stuck = each(slurs.len(), |n| {
+        let (reed, velocity, from, to) = slurs[n];
+        let on = |s: f64, written: u8| (s, Event::NoteOn { note: sounding(written), velocity });
+        let out = rendered(&reeds[reed], &[on(0.0, from), on(0.4, to), release(0.45, from)], 1.0);
+        !is_in_register(&out[sample(0.8)..sample(0.95)], to)
+    });
+    let lost: Vec<_> =
+        slurs.iter().zip(&stuck).filter(|(_, is_stuck)| **is_stuck).map(|(slur, _)| slur).collect();
+    println!("{} of {} slurs stay on the old mode: {lost:?}", lost.len(), slurs.len());
+    assert!(lost.len() <= slurs.len() / 200, "{lost:?}");
+}
+
+#[test]
+fn a_key_that_sounds_again_is_as_loud_as_it_was_struck() {
+    let on = |s: f64, written: u8, velocity: f32| (s, Event::NoteOn { note: sounding(written), velocity });
+    let events = [on(0.0, 64, 0.8), on(1.0, 67, 0.15), release(1.5, 67)];
+    let out = rendered(&Settings { noise: 0.0, ..still() }, &events, 2.5);
+    let level = |from: f64| level_db(&out[sample(from)..sample(from + 0.3)]);
+    let (before, between, after) = (level(0.6), level(1.15), level(2.1));
+    println!("{before:.1}, {between:.1}, {after:.1} dB");
+    assert!(between < before - 6.0 && (after - before).abs() < 0.5);
+}
+
 #[test]
 fn velocity_shapes_the_attack_of_a_note_that_a_controller_blows() {
     let t90 = |velocity: f32| {

@@ -2,7 +2,7 @@
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::haptics::{PlayedReed, RequirementSolver};
-use crate::instrument::lip::embouchure;
+use crate::instrument::lip::damped;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 use crate::reed::Lip;
@@ -16,10 +16,7 @@ pub fn played_reed(file: &InstrumentFile, a4_hz: f64, settings: &Settings) -> Pl
     let lips = file
         .fingerings
         .iter()
-        .map(|fingering| {
-            let lip = embouchure(sounding_hz(fingering.written), lowest_hz);
-            Lip { resonance_hz: lip.resonance_hz, damping: lip.damping * f64::from(settings.damping) }
-        })
+        .map(|fingering| damped(sounding_hz(fingering.written), lowest_hz, f64::from(settings.damping)))
         .collect();
     PlayedReed {
         law: settings.reed_law(),

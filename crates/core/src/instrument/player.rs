@@ -37,6 +37,7 @@ mod sway;
 mod technique;
 mod tongue;
 mod tuning;
+mod velocities;
 pub mod vibrato;
 mod voicing;
 
@@ -71,6 +72,7 @@ use sway::Swaying;
 use technique::PlayedTechniques;
 use tongue::Tongue;
 use tuning::PlayedTuning;
+use velocities::Velocities;
 use voicing::{Voiced, Voicing};
 
 /// Time the fingers take behind the tongue, ms; slurred they take the setting's time.
@@ -129,6 +131,7 @@ pub struct Player {
     /// `None` until the next tick works it out.
     posture: Option<Posture>,
     keys: Keys,
+    velocities: Velocities,
     breath: Breath,
     response: Response,
     ear: Ear,
@@ -294,7 +297,10 @@ impl Player {
         while let Some(last) = self.keys.last() {
             match self.take_up(last, model) {
                 None => self.keys.release(last),
-                fingering => return fingering,
+                fingering => {
+                    self.breath.set_velocity(self.velocities.of(last));
+                    return fingering;
+                }
             }
         }
         None
@@ -310,6 +316,7 @@ impl Player {
         let Some(fingering) = self.take_up(note, model) else { return };
         let slurred = !self.keys.is_empty();
         self.keys.press(note);
+        self.velocities.strike(note, velocity);
         self.breath.set_velocity(velocity);
         if !slurred {
             self.prepare(fingering, model);
@@ -423,6 +430,8 @@ impl Player {
             place: model.place(fingering),
             note_hz: model.notes_hz[fingering],
             over_lowest: model.notes_hz[fingering] / model.size_hz,
+            lay: f64::from(self.settings.lay),
+            damping: f64::from(self.settings.damping),
         });
         match (slur, self.settings.breath_response) {
             (Some(slur), BreathResponse::Played) => {

@@ -21,6 +21,7 @@ impl Player {
             settings: self.settings,
             fingers: if has_same { from.fingers.lifted() } else { Fingers::default() },
             keys: from.keys,
+            velocities: from.velocities,
             inflection: from.inflection.carried(),
             inhalation: from.inhalation,
             ..from.controlled(self.person)

@@ -13,7 +13,7 @@ use super::step_towards;
 use super::technique::subtone::{at_place, covered};
 use super::voicing;
 use crate::instrument::bend::{self, BendSplit};
-use crate::instrument::lip::embouchure;
+use crate::instrument::lip::{damped, embouchure};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::settings::{BreathResponse, Settings, Tuning};
@@ -167,13 +167,14 @@ impl Posture {
     /// For what is fingered, with ticks of `tick_s` seconds.
     pub fn new(settings: &Settings, fingered: &Fingered, tick_s: f64, model: &Model) -> Self {
         let Fingered { fingering, alternate_cents, bend_cents, subtone, follows } = *fingered;
-        let lip = embouchure(model.notes_hz[fingering], model.size_hz);
+        let (note_hz, lowest_hz) = (model.notes_hz[fingering], model.size_hz);
+        let lip = embouchure(note_hz, lowest_hz);
         let free = MovingReed {
             law: settings.reed_law(),
             zeta: f64::from(settings.zeta),
             lay: f64::from(settings.lay),
             resonance_hz: lip.resonance_hz,
-            damping: lip.damping * f64::from(settings.damping),
+            damping: damped(note_hz, lowest_hz, f64::from(settings.damping)).damping,
             swept_s: model.swept_s,
         };
         let place = model.place(fingering);
