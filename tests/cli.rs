@@ -1466,6 +1466,13 @@ fn notes_without_length_and_a_tempo_without_time_are_told() {
     let output = chalumeau(d.path(), words("render brief.mid --out x.wav"));
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(message.contains("1 note is never heard: no time lies between beginning and end"), "{message}");
+    // Two at once, too.
+    let two =
+        [0, 0x90, 60, 64, 0, 0x90, 62, 64, 0, 0x80, 60, 0, 0, 0x80, 62, 0, 96, 0x90, 64, 64, 96, 0x80, 64, 0];
+    fs::write(d.path().join("two.mid"), with_messages(&two)).unwrap();
+    let output = chalumeau(d.path(), words("render two.mid --out x.wav --force"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("2 notes are never heard: no time lies"), "{message}");
     // Of a chord, the last is heard.
     let chord = [0, 0x90, 60, 64, 0, 0x90, 62, 64, 96, 0x80, 60, 0, 0, 0x80, 62, 0];
     fs::write(d.path().join("chord.mid"), with_messages(&chord)).unwrap();
@@ -1478,6 +1485,8 @@ fn notes_without_length_and_a_tempo_without_time_are_told() {
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(message.contains("track 1 has a tempo of 0 us for a beat at tick 0"), "{message}");
     assert!(!output.status.success() && !d.path().join("y.wav").exists());
+    let tracks = chalumeau(d.path(), words("render stopped.mid --tracks --out y.wav"));
+    assert!(String::from_utf8(tracks.stderr).unwrap().contains("has a tempo of 0 us"));
 }
 
 #[test]

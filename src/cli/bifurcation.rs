@@ -10,7 +10,7 @@ use crate::cli::silent_keys::silent_keys;
 use crate::cli::threshold::linear_threshold;
 use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::measure::bifurcation;
-use chalumeau_core::measure::bifurcation::Transitions;
+use chalumeau_core::measure::bifurcation::{BifurcationDiagram, Transitions};
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 use chalumeau_figure::bifurcation::Ramp;
@@ -125,9 +125,7 @@ impl BifurcationCommand {
                 begins: changes.begins,
                 shuts: changes.shuts,
                 chokes: changes.chokes,
-                gives_way: found.other_register().is_some_and(|(way, gamma)| {
-                    way > 0 && changes.chokes.is_none_or(|chokes| gamma <= chokes + NEAR)
-                }),
+                gives_way: gives_way(&found, &changes),
                 returns: changes.returns,
                 ends: changes.ends,
             }
@@ -136,8 +134,17 @@ impl BifurcationCommand {
     }
 }
 
-/// Where a note ends and another register is heard, these are one place: the points of a ramp are so far apart, gamma.
-const NEAR: f64 = 0.02;
+/// Whether the note of a growing breath ends because another register takes over, not because the reed stays shut.
+fn gives_way(found: &BifurcationDiagram, changes: &Transitions) -> bool {
+    // The two are told by windows of time, which may be one apart.
+    let step = found.up.windows(2).map(|pair| pair[1].gamma - pair[0].gamma).fold(0.0, f64::max);
+    let (Some((1, gamma)), Some(begins), Some(chokes)) =
+        (found.other_register(), changes.begins, changes.chokes)
+    else {
+        return false;
+    };
+    (begins..=chokes + 2.0 * step).contains(&gamma)
+}
 
 /// Refuses a note whose key stays silent: a table of zeros would look as if it had been measured.
 pub(super) fn refuse_silent(

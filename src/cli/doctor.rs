@@ -47,6 +47,7 @@ pub struct DoctorCommand {
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8000")]
     osc: Option<u16>,
     /// With --osc: listen to the whole network instead of this machine alone
+    // Its name was --any-address.
     #[arg(long, alias = "any-address", requires = "osc")]
     network: bool,
     /// How long each knob is watched once it answers, s, 1..3600

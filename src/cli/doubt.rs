@@ -59,8 +59,8 @@ impl Doubt {
     /// For the user.
     pub fn text(self) -> &'static str {
         match self {
-            Self::Clipped => "samples clipped: lower --gain-db, or write --bits 32f",
-            Self::Limited => "the limiter turned peaks down; lower --gain-db for levels as played",
+            Self::Clipped => "samples clipped: lower the gain, or write floats of 32 bits, which do not clip",
+            Self::Limited => "the limiter turned peaks down; lower the gain for levels as played",
             Self::Reset => "the calculation broke down and the instrument was reset; please report this",
             Self::NoTone => {
                 "no tone is heard, or none after 0.5 s: the breath is too weak for the note, or so strong that the reed stays shut, or the key is silent, or the volume is 0"

@@ -6,6 +6,7 @@ use crate::cli::plot_args::PlotArgs;
 use crate::cli::progress_bar::waiting;
 use crate::cli::shared_args::{counted, within};
 use crate::wav;
+use chalumeau_core::analysis::pitch::HIGHEST_HZ;
 use chalumeau_core::analysis::recording::{self, Note};
 use chalumeau_core::analysis::spectrum::HARMONICS;
 use chalumeau_core::units::{SoundingNote, cents};
@@ -15,8 +16,6 @@ use std::path::PathBuf;
 /// The longest part that is measured, s: ten minutes need 1 GB at 48 kHz, and half a minute.
 const LONGEST_S: f64 = 600.0;
 
-/// Pitches up to here are measured, Hz.
-const HIGHEST_HZ: f64 = 2_500.0;
 /// A note without odd harmonics: all of them lie below this, dB re the strongest. A clarinet's are never so weak.
 const NO_ODD_DB: f64 = -60.0;
 

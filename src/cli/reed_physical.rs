@@ -1,4 +1,4 @@
-//! The reed as its maker measures it, as arguments and as a table of both its faces.
+//! The reed as its maker measures it, as arguments and as a table of both its descriptions.
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
@@ -89,7 +89,7 @@ impl PhysicalReedArgs {
     }
 }
 
-/// Both faces of a reed, one quantity a line.
+/// Both descriptions of a reed, one quantity a line.
 pub fn both_faces(
     seed: &DimensionlessReed,
     reed: &PhysicalReed,
@@ -100,7 +100,7 @@ pub fn both_faces(
     let reference = PhysicalReed::reference();
     let mut table = table.open("quantity,symbol,value,unit")?;
     table.comment(format_args!(
-        "one reed, two faces; strength as on the box is of the stiffness, 2.5 being {:.0} N/m; a 14.9 mm bore",
+        "one reed, two descriptions; strength as on the box is of the stiffness, 2.5 being {:.0} N/m; a 14.9 mm bore",
         reference.stiffness_n_m
     ))?;
     let closing_pa = reed.closing_pa();

@@ -272,7 +272,7 @@ fn pitches_in_words(heard: &[MeasuredNote], growls: bool) -> String {
         None => String::new(),
     };
     if growls && others.is_some() {
-        words += " (a growl may have the period of the voice, an octave below)";
+        words += " (a growl may have the period of the voice)";
     }
     words + "."
 }

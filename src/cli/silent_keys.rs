@@ -37,21 +37,21 @@ pub fn never_heard(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> 
         let to = timed.event.to;
         let at = hands.iter().position(|hand| hand.to == to).unwrap_or(hands.len());
         if at == hands.len() {
-            hands.push(Hand { to, keys: Keys::default(), unheard: Vec::new(), was_alone: true });
+            hands.push(Hand { to, keys: Keys::default(), unheard: Vec::new() });
         }
         let hand = &mut hands[at];
-        let is_alone = hand.unheard.len() == 1 && hand.was_alone;
-        let ended = match timed.event.event {
-            Event::NoteOn { note, .. } if reach.fingering(note, model).is_some() => hand.press(note),
+        let ended: Vec<Unheard> = match timed.event.event {
+            Event::NoteOn { note, .. } if reach.fingering(note, model).is_some() => hand.press(note, now),
             Event::NoteOff { note } | Event::Choke { note } => hand.release(note),
             Event::Panic => {
                 hand.keys = Keys::default();
-                std::mem::take(&mut hand.unheard).len()
+                std::mem::take(&mut hand.unheard)
             }
-            _ => 0,
+            _ => Vec::new(),
         };
-        // It began and ended in this moment, with no other.
-        *(if is_alone { &mut brief } else { &mut hidden }) += ended;
+        // What began in this moment has no length.
+        let of_now = ended.iter().filter(|(_, at)| *at == now).count();
+        (brief, hidden) = (brief + of_now, hidden + ended.len() - of_now);
     }
     hands.iter_mut().for_each(Hand::hear);
     hidden += hands.iter().map(|hand| hand.unheard.len()).sum::<usize>();
@@ -71,35 +71,31 @@ pub fn never_heard(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> 
 struct Hand {
     to: To,
     keys: Keys,
-    /// Those that have not been heard yet.
-    unheard: Vec<SoundingNote>,
-    /// At most one of them has begun in this moment.
-    was_alone: bool,
+    unheard: Vec<Unheard>,
 }
+
+/// A key that has not been heard yet, and the sample at which it went down.
+type Unheard = (SoundingNote, usize);
 
 impl Hand {
     /// Time passes.
     fn hear(&mut self) {
         let heard = self.keys.last();
-        self.unheard.retain(|&key| Some(key) != heard);
-        self.was_alone = self.unheard.is_empty();
+        self.unheard.retain(|&(key, _)| Some(key) != heard);
     }
 
-    /// Returns how many notes end unheard.
-    fn press(&mut self, note: SoundingNote) -> usize {
+    /// Returns the notes that end unheard.
+    fn press(&mut self, note: SoundingNote, now: usize) -> Vec<Unheard> {
         let ended = self.release(note);
         self.keys.press(note);
-        self.was_alone = self.unheard.is_empty();
-        self.unheard.push(note);
+        self.unheard.push((note, now));
         ended
     }
 
     /// Likewise.
-    fn release(&mut self, note: SoundingNote) -> usize {
+    fn release(&mut self, note: SoundingNote) -> Vec<Unheard> {
         self.keys.release(note);
-        let before = self.unheard.len();
-        self.unheard.retain(|&key| key != note);
-        before - self.unheard.len()
+        self.unheard.extract_if(.., |(key, _)| *key == note).collect()
     }
 }
 

@@ -32,6 +32,9 @@ const MEASURE_S: f64 = 0.6;
 /// through which no air flows (--A 0) moves at most as loud as -71 dBFS.
 const SILENT_DBFS: f64 = -65.0;
 
+/// Share of the sample rate below which a rendered note is heard: the resampler lets nothing beyond half of it pass (by judgement).
+const ROOM: f64 = 0.45;
+
 /// A note that is so far off beside the others has the name of another octave. A squeak is nearer: that of C#7 lies 734 cents off.
 const MISNAMED_CENTS: f64 = 900.0;
 
@@ -161,7 +164,7 @@ impl TuneCommand {
         }
         let beyond = |note: &WrittenNote| {
             let sounding = note.sounding(transposition);
-            sounding.is_some_and(|note| note.frequency_hz(f64::from(settings.a4_hz)) > 0.45 * f64::from(rate))
+            sounding.is_some_and(|note| note.frequency_hz(f64::from(settings.a4_hz)) > ROOM * f64::from(rate))
         };
         if notes.iter().any(beyond) {
             say!("note: a rate of {rate} Hz has no room for the highest of these notes; --rate 48000 has");

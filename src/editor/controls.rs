@@ -9,7 +9,7 @@ use crate::controllers::{ControllerLinks, ControllerMap};
 use std::path::Path;
 
 use crate::editor::ab_comparison::Values;
-use crate::editor::snapshot::{Snapshot, USER_FILE};
+use crate::editor::snapshot::Snapshot;
 use crate::editor::terms;
 use crate::editor::undo::{Change, DeviceChoice, Step, UndoHistory};
 
@@ -247,8 +247,7 @@ impl Hands<'_> {
         let Some(look) = self.controls.look("instr") else { return };
         // The last of the list is the user's file.
         let changes = vec![Change { id: "instr", before: look.value, after: 1.0 }];
-        let before = snapshot.instrument_key.strip_prefix(USER_FILE).unwrap_or_default().to_owned();
-        let file = Some([before, path.display().to_string()]);
+        let file = Some([snapshot.instrument_file.clone(), path.display().to_string()]);
         self.history.record(Step { changes, file, ..Step::default() });
     }
 

@@ -80,13 +80,12 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, grown: f32) {
     let steps = reading.marks.windows(2).filter(|pair| pair.iter().all(|mark| mark.is_dynamic));
     let step = steps.map(|pair| y(pair[0].at) - y(pair[1].at)).fold(f32::INFINITY, f32::min);
     let is_low = step < LINE * grown;
-    // What the first line means, the tip says where it has no room for a word.
-    let dynamics = |mark: &&MeterMark| mark.is_dynamic;
-    let first = reading.marks.iter().find(dynamics).map_or(f32::NEG_INFINITY, |mark| y(mark.at));
+    let has_dynamics = reading.marks.iter().any(|mark| mark.is_dynamic);
     for mark in &reading.marks {
         let is_word = match mark.is_dynamic {
             true => !is_low || ["pp", "mf", "ff"].contains(&mark.name),
-            false => reading.marks.iter().all(|mark| !mark.is_dynamic) || y(mark.at) - first >= LINE * grown,
+            // Beside *pp* there is no room; the tip says what the line means.
+            false => !has_dynamics,
         };
         let reach = if mark.is_dynamic { 4.0 } else { 7.0 };
         let from = if mark.is_dynamic { column.right() } else { column.left() - 4.0 };
@@ -118,14 +117,15 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, grown: f32) {
     let at = pos2(rect.left() + 10.0, rect.bottom() - 4.0);
     let name = painter.layout(source.to_owned(), small, c.quiet, rect.width() - 10.0);
     painter.galley(at - vec2(0.0, name.size().y), name, c.quiet);
-    let kpa = snapshot.mouth_now_kpa();
-    let played = snapshot.settings.breath_response == BreathResponse::Played;
-    let told = match played {
-        true => format!("{}, from {source}. The green line: the note speaks from there.", reading.word),
-        false => format!("Mouth pressure {kpa:.2} kPa, {}, from {source}", reading.word),
+    let (told, more) = match has_dynamics {
+        true => (format!("{}, from {source}", reading.word), "The note speaks from the green line on."),
+        false => (
+            format!("Mouth pressure {:.2} kPa, {}, from {source}", snapshot.mouth_now_kpa(), reading.word),
+            "",
+        ),
     };
     response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, &told));
-    response.on_hover_text_at_pointer(told);
+    response.on_hover_text_at_pointer(format!("{told}\n{more}").trim_end());
 }
 
 /// Slanted, as dynamics are printed.

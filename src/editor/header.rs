@@ -221,19 +221,28 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
 /// Takes the last step back.
 pub fn undo_step(hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
     let restored = hands.history.undo(snapshot.altered_key(), &snapshot.alterations);
-    restore(restored, hands, actions);
+    restore(restored, hands, snapshot, actions);
 }
 
 /// Does the last step that was taken back again.
 pub fn redo_step(hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
     let restored = hands.history.redo(snapshot.altered_key(), &snapshot.alterations);
-    restore(restored, hands, actions);
+    restore(restored, hands, snapshot, actions);
 }
 
-fn restore(restored: Restored, hands: &mut Hands, actions: &mut Vec<Action>) {
-    // Before the choice of the user's file, so that no other one is read.
-    actions.extend(restored.file.map(Action::NameInstrumentFile));
-    hands.restore(&restored.values);
+fn restore(restored: Restored, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    let Restored { values, file, .. } = &restored;
+    let (choices, others): (Vec<_>, Vec<_>) =
+        values.iter().partition(|(id, _)| *id == "instr" && file.is_some());
+    hands.restore(&others);
+    if let Some(file) = file {
+        // First the file, then the choice of it, so that no other one is read.
+        actions.push(Action::NameInstrumentFile(file.clone()));
+        let last = snapshot.instruments.len().saturating_sub(1) as f32;
+        actions.extend(
+            choices.iter().map(|(_, value)| Action::ChooseInstrument((value * last).round() as usize)),
+        );
+    }
     actions.extend(restored.preset.map(Action::ChosePreset));
     actions.extend(restored.alterations.map(Action::Alter));
     if let (Some([left, wanted]), Some(links)) = (&restored.links, hands.controls.links())

@@ -249,7 +249,8 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
 fn latency(snapshot: &Snapshot) -> String {
     let own = format!("{:.1} ms", snapshot.latency_ms);
     let card = snapshot.connections.as_ref().map(|connections| &connections.chosen);
-    match card.filter(|chosen| chosen.output != OutputChoice::Jack) {
+    // JACK and WASAPI have blocks of their own.
+    match card.filter(|chosen| !cfg!(windows) && chosen.output != OutputChoice::Jack) {
         Some(chosen) => {
             let block_ms = 1e3 * f64::from(chosen.block) / f64::from(chosen.rate_hz);
             format!("{own}, and a block of {block_ms:.1} ms")

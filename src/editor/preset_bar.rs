@@ -43,10 +43,10 @@ pub fn bar(
         let place = Rect::from_min_size(pos2(x, rect.top()), vec2(ARROW, rect.height()));
         let word = if by < 0 { "Previous preset" } else { "Next preset" };
         let preset = shelf.beside(name, by, |preset| browser.is_shown(preset, shelf));
-        let among = browser.among().map_or_else(String::new, |among| format!(" ({among})"));
+        let among = browser.among().map_or_else(String::new, |among| format!(", only {among}"));
         let hint = match preset {
-            Some(preset) => format!("{word}: {}{among}", preset.name),
-            None => format!("No preset is like that{among}"),
+            Some(preset) => format!("{word}{among}: {}", preset.name),
+            None => format!("{word}{among}: there is none"),
         };
         if arrow(ui, place, by as f32, word).on_hover_text(hint).clicked()
             && let Some(preset) = preset

@@ -69,7 +69,7 @@ impl PresetBrowser {
         self.is_open = !self.is_open;
         self.form = None;
         if self.is_open {
-            (self.reveal, self.listed) = (Some(chosen.to_owned()), 0);
+            (self.reveal, self.chosen, self.listed) = (Some(chosen.to_owned()), chosen.to_owned(), 0);
             actions.push(Action::ReadPresets);
         }
     }
@@ -180,9 +180,8 @@ impl PresetBrowser {
         // What is chosen by an arrow, or by undo, comes into sight.
         if self.chosen != snapshot.preset {
             self.chosen.clone_from(&snapshot.preset);
-            if found(&self.chosen).is_some_and(|at| !self.seen.contains(&at)) {
-                self.reveal = Some(self.chosen.clone());
-            }
+            let is_away = found(&self.chosen).is_some_and(|at| !self.seen.contains(&at));
+            self.reveal = is_away.then(|| self.chosen.clone());
         }
         let before = std::mem::replace(&mut self.listed, shown.len());
         let wanted = self.reveal.as_ref().and_then(found);
@@ -197,10 +196,11 @@ impl PresetBrowser {
             area = area.vertical_scroll_offset(middle.clamp(0.0, most));
             self.reveal = None;
         }
-        let seen = &mut self.seen;
+        let (seen, chosen, count) = (&mut self.seen, &mut self.chosen, shown.len());
         area.show_rows(ui, ROW, shown.len(), |ui, rows| {
-            // The rows at both ends may be cut.
-            *seen = rows.start + 1..rows.end.saturating_sub(1);
+            // The rows at both ends may be cut, and the last one that is drawn is out of sight.
+            let last = if rows.end == count { 1 } else { 2 };
+            *seen = rows.start + usize::from(rows.start > 0)..rows.end.saturating_sub(last);
             for preset in &shown[rows] {
                 let is_here = snapshot.preset == preset.name;
                 let (row, star) = row(ui, preset, is_here, shelf);
@@ -208,6 +208,8 @@ impl PresetBrowser {
                     let is_liked = !shelf.is_liked(&preset.name);
                     actions.push(Action::LikePreset { name: preset.name.clone(), is_liked });
                 } else if row.clicked() {
+                    // It is where the pointer is, and stays there.
+                    chosen.clone_from(&preset.name);
                     choose(preset, &snapshot.preset, hands, actions);
                 }
             }

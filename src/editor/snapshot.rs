@@ -21,9 +21,6 @@ use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::instrument::{KeyPitches, Settings};
 use chalumeau_core::units::{SoundingNote, WrittenNote, clamped_or};
 
-/// How the name of an instrument begins that is a file of the user's; its path follows.
-pub const USER_FILE: &str = "user:";
-
 /// Less mouth pressure than this is no breath, kPa.
 pub const NO_BREATH_KPA: f32 = 0.02;
 
@@ -34,8 +31,10 @@ pub struct Snapshot {
     pub instrument: Arc<InstrumentFile>,
     /// The same as its file has it, before any alteration and before scaling.
     pub as_built: Arc<InstrumentFile>,
-    /// What names this instrument in a saved project; a file of the user's begins with [`USER_FILE`].
+    /// What names this instrument in a saved project.
     pub instrument_key: String,
+    /// The file that *User file* stands for, whichever instrument plays; empty for the usual place.
+    pub instrument_file: String,
     /// Whether it can be altered: not while another one comes.
     pub can_alter: bool,
     /// What the user has altered, in lengths of the file.
@@ -125,6 +124,7 @@ impl Default for Snapshot {
             as_built: instrument.clone(),
             instrument,
             instrument_key: String::new(),
+            instrument_file: String::new(),
             can_alter: true,
             alterations: Arc::default(),
             saved: None,

@@ -144,7 +144,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("breath", BREATH, "Breath", percent(0.0))
         .help(
             "How hard the player blows, in percent",
-            "Moving it blows the instrument. Played: the dynamic, from where notes begin to fortissimo. Physical: the mouth pressure in percent of *Full breath*. The note starts at the threshold of the reed. More pressure is louder and brighter; then the reed beats, and at last it closes.",
+            "Moving it sets the breath. Played: the dynamic, from where notes begin to fortissimo. Physical: the mouth pressure in percent of *Full breath*. The note starts at the threshold of the reed. More pressure is louder and brighter; then the reed beats, and at last it closes.",
             "",
         )
         .midi("CC2 (fine CC34), CC11 (fine CC43), channel pressure")

@@ -33,13 +33,14 @@ impl PresetShelf {
         self.user.favourites.contains(name)
     }
 
-    /// The preset `by` places after the one called `name` among those that are wanted, round and round; the first where there is no
-    /// such.
+    /// The next preset after the one called `name` (`by` 1), or the one before it (-1), that is wanted, round and round; the first of all
+    /// where there is none of that name.
     pub fn beside(&self, name: &str, by: isize, is_wanted: impl Fn(&Preset) -> bool) -> Option<&Preset> {
-        let wanted: Vec<&Preset> = self.all().filter(|preset| is_wanted(preset)).collect();
-        let at = wanted.iter().position(|preset| preset.name == name);
-        let next = at.map_or(0, |at| (at as isize + by).rem_euclid(wanted.len().max(1) as isize) as usize);
-        wanted.get(next).copied()
+        let all: Vec<&Preset> = self.all().collect();
+        let at = all.iter().position(|preset| preset.name == name);
+        let from = at.map_or(-by, |at| at as isize);
+        let step = |n: usize| (from + by * n as isize).rem_euclid(all.len() as isize) as usize;
+        (1..=all.len()).map(|n| all[step(n)]).find(|preset| is_wanted(preset))
     }
 
     /// All tags, in the order in which they first appear.
@@ -69,6 +70,7 @@ mod tests {
         assert_eq!(name(first, 1), factory::all()[1].name);
         let jazz = |by| shelf.beside(first, by, |preset| preset.has_tag("jazz")).unwrap();
         assert!(jazz(1).has_tag("jazz") && shelf.beside(first, 1, |_| false).is_none());
+        assert_ne!(jazz(1).name, jazz(-1).name, "the nearest on either side");
         assert!(shelf.is_users("Mine") && !shelf.is_users(first));
         assert_eq!(shelf.tags().last(), Some(&"new"));
     }

@@ -41,6 +41,8 @@ fn click(window: &mut Window, label: &str) -> Vec<Action> {
 #[test]
 fn an_instrument_file_is_found_by_its_folders() {
     let mut window = browsing("Open an instrument file", Place::Instruments);
+    // A file that was opened before, while another clarinet plays.
+    window.snapshot.borrow_mut().instrument_file = "/home/music/other.toml".to_owned();
     for hidden in ["fifths.SCL", "notes.txt"] {
         assert!(window.harness.query_by_label(hidden).is_none(), "{hidden} is no instrument");
     }
@@ -59,10 +61,10 @@ fn an_instrument_file_is_found_by_its_folders() {
     assert_eq!(click(&mut window, "Yours"), [Action::ReadFolder(Place::Instruments)]);
     click(&mut window, "Cancel");
     window.harness.get_by_label("Open a scale");
-    let undone = click(&mut window, "Undo");
-    assert_eq!(undone, [Action::NameInstrumentFile(String::new())]);
-    let redone = click(&mut window, "Redo");
-    assert_eq!(redone, [Action::NameInstrumentFile("/home/music/mine.toml".to_owned())]);
+    let named = |path: &str| Action::NameInstrumentFile(path.to_owned());
+    let user = window.snapshot.borrow().instruments.len() - 1;
+    assert_eq!(click(&mut window, "Undo"), [named("/home/music/other.toml"), Action::ChooseInstrument(0)]);
+    assert_eq!(click(&mut window, "Redo"), [named("/home/music/mine.toml"), Action::ChooseInstrument(user)]);
 }
 
 #[test]

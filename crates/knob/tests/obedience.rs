@@ -224,7 +224,8 @@ fn a_host_that_stops_calling_and_whose_free_is_lost_ends_torque_by_the_watchdog(
     for (binding, claimed_ms) in BINDINGS.into_iter().zip([630, 880]) {
         let worst =
             worst_ms("no beat, no FREE", binding, |play| (play.beats, play.loses_free) = (false, true));
-        assert!((600..=claimed_ms + 1).contains(&worst), "{worst} ms");
+        // Nearly so long: without the loss it would be shorter.
+        assert!((claimed_ms - 40..=claimed_ms + 1).contains(&worst), "{worst} ms");
     }
 }
 

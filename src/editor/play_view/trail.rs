@@ -18,9 +18,11 @@ const DECAY_DB: f32 = 25.0;
 const LOUDEST_OF_S: f32 = 1.0;
 /// Time in which a note finds its pitch, s.
 const ATTACK_S: f32 = 0.08;
-
-/// A change of fingers, s: shorter than the notes of the quickest ornament.
+/// Time in which fingers change from note to note, s (by judgement).
 const CHANGE_S: f32 = 0.06;
+/// A pitch so far outside of both its neighbours is that of another mode of the air column, semitones: less than the fifth or so between
+/// the upper modes, and more than an ornament leaps.
+const MODES_APART: f32 = 6.0;
 
 /// The pitches that were played: those of attacks and decays are left out. An attack follows a pause.
 fn played(track: &Track) -> Vec<Option<f32>> {
@@ -56,7 +58,7 @@ fn forget_changes(played: &mut [Option<f32>], steps: usize) {
         let after = stretches.get(at + 1).and_then(|after| after.1);
         if let (Some(before), Some(pitch), Some(after)) = (before, first, after)
             && length <= steps
-            && (pitch < before.min(after) - 1.0 || pitch > before.max(after) + 1.0)
+            && (pitch < before.min(after) - MODES_APART || pitch > before.max(after) + MODES_APART)
         {
             played[begin..begin + length].fill(None);
         }

@@ -8,7 +8,6 @@ use std::sync::{Arc, RwLock};
 use nice_plug::prelude::*;
 
 use super::entry::{choice, choice_from, status, whole};
-use crate::editor::snapshot::USER_FILE;
 use crate::plugin::launch_options::LaunchOptions;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::instrument::prepare::Quality;
@@ -120,7 +119,7 @@ impl InstrumentParams {
     pub fn key(&self) -> String {
         match self.choice.value() {
             InstrumentChoice::User => {
-                self.file.read().map_or_else(|_| USER_FILE.to_owned(), |path| format!("{USER_FILE}{path}"))
+                format!("user:{}", self.file.read().map_or_else(|_| String::new(), |path| path.clone()))
             }
             bundled => bundled.id().to_owned(),
         }

@@ -6,7 +6,7 @@ use super::entry::{choice, number};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
 
-/// Which of the reed's two faces rules.
+/// Which of the reed's two descriptions rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
 pub enum ReedDescription {
     /// The seed's H, k and A, and zeta.
@@ -101,13 +101,13 @@ mod tests {
     }
 
     #[test]
-    fn the_other_face_says_nothing() {
+    fn the_other_description_says_nothing() {
         let params = description(ReedDescription::Dimensionless, |reed| reed.stiffness_n_m *= 2.0);
         assert_eq!(params.over(Settings::default()), Settings::default());
     }
 
     #[test]
-    fn both_faces_of_the_reference_reed_are_one_reed() {
+    fn both_descriptions_of_the_reference_reed_are_one_reed() {
         let (seed, physical) =
             (Settings::default(), description(ReedDescription::Physical, |_| {}).over(Settings::default()));
         let near = |a: f32, b: f32| (a / b - 1.0).abs() < 1e-6;

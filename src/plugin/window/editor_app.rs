@@ -155,7 +155,7 @@ impl WindowMemory {
         }
     }
 
-    /// Sets a choice parameter to value `index` of `count`, as the user would.
+    /// The file that *User file* stands for.
     fn name_instrument_file(&self, path: String) {
         if let Ok(mut file) = self.handles.params.instrument.file.write() {
             *file = path;
@@ -163,6 +163,7 @@ impl WindowMemory {
         self.handles.params.host.state_changed();
     }
 
+    /// Sets a choice parameter to value `index` of `count`, as the user would.
     fn choose(&self, id: &str, index: usize, count: usize, gui: &GuiContext) {
         let controls = self.controls.with(gui);
         controls.begin(id);

@@ -181,6 +181,9 @@ impl SnapshotThread {
             return;
         };
         (snapshot.as_built, snapshot.instrument_key) = (as_built, key);
+        if let Ok(path) = self.handles.params.instrument.file.read() {
+            snapshot.instrument_file.clone_from(&path);
+        }
         let fingering = fingering.min(file.fingerings.len().saturating_sub(1));
         let open = self
             .shared

@@ -91,7 +91,7 @@ impl FeelDesign {
     pub const EXAGGERATION: (f64, f64) = (1.0, 5.0);
     /// Range of the strength, mNm: up to what any knob may make.
     pub const STRENGTH_MNM: (f64, f64) = (0.0, HARD_CEILING_MNM as f64);
-    /// Range of the angle of closure, degrees.
+    /// Range of the angle of closure, degrees: what a hand can turn comfortably, by judgement.
     pub const TRAVEL_DEG: (f64, f64) = (120.0, 1_080.0);
     /// Range of the mark's height, mNm.
     pub const MARK_MNM: (f64, f64) = (0.0, 100.0);

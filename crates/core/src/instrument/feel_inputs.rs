@@ -5,7 +5,6 @@ use crate::haptics::{PlayedReed, RequirementSolver};
 use crate::instrument::lip::damped;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
-use crate::reed::Lip;
 
 /// The reed under these settings, with the law and the lip that the sound has, for every fingering of a file that plays at
 /// `a4_hz`, Hz. Allocates.

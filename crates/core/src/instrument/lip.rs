@@ -26,11 +26,17 @@ pub fn embouchure(note_hz: f64, lowest_hz: f64) -> Lip {
     Lip { resonance_hz, damping: 0.8 + way * (0.25 - 0.8) + highest * (0.13 - 0.25) }
 }
 
+/// Written C6 over the lowest note, 32 semitones: up to here a factor on the damping counts wholly. From here on notes were lost with a factor
+/// of 1.4 and little breath: written F#6 for 0.75 s and longer, E flat 6 for 0.5 s.
+const WHOLE_FACTOR: f64 = 6.35;
+/// Written E flat 6, 35 semitones: from here on it does not count.
+const NO_FACTOR: f64 = 7.55;
+
 /// The same, where the player damps the reed by another factor than usual: into the altissimo the factor fades, because a damped reed
 /// cannot hold these notes; from written E flat 6 on it does nothing. Real-time safe.
 pub fn damped(note_hz: f64, lowest_hz: f64, factor: f64) -> Lip {
     let lip = embouchure(note_hz, lowest_hz);
-    let left = ((7.55 - note_hz / lowest_hz) / (7.55 - 6.35)).clamp(0.0, 1.0);
+    let left = ((NO_FACTOR - note_hz / lowest_hz) / (NO_FACTOR - WHOLE_FACTOR)).clamp(0.0, 1.0);
     Lip { damping: lip.damping * (1.0 + left * (factor - 1.0)), ..lip }
 }
 

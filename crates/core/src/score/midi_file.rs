@@ -159,10 +159,15 @@ impl Clock {
         self.numerator += u128::from(ticks) * self.per_tick;
     }
 
-    fn set_tempo(&mut self, us_per_beat: u32) {
+    /// A tempo at this message. It does not count where ticks are parts of a film frame.
+    fn set_tempo(&mut self, us_per_beat: u32, at: &Message) -> Result<(), MidiFileError> {
+        if self.metrical && us_per_beat == 0 {
+            return Err(MidiFileError::Tempo { track: at.track, tick: at.tick });
+        }
         if self.metrical {
             self.per_tick = u128::from(us_per_beat);
         }
+        Ok(())
     }
 
     fn sample(&self, rate: u32) -> Result<usize, MidiFileError> {
@@ -199,10 +204,7 @@ pub fn read_parts(parts: &mut Parts, bytes: &[u8], rate: u32) -> Result<Score<Pa
         let decoded = match message.kind {
             TrackEventKind::Midi { channel, message } => decode(parts, channel.as_int(), message),
             TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
-                if us.as_int() == 0 {
-                    return Err(MidiFileError::Tempo { track: message.track, tick: message.tick });
-                }
-                clock.set_tempo(us.as_int());
+                clock.set_tempo(us.as_int(), &message)?;
                 &[]
             }
             _ => &[],

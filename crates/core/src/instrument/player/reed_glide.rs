@@ -1,4 +1,4 @@
-//! New settings of lip, reed and register vent, reached in a little time, as a player's lip moves: at once they would click.
+//! New settings of lip, reed and vent loss, reached in a little time, as a player's lip moves: at once they would click.
 //!
 //! A step of the reed's law is a step of the flow, and what is heard of a flow is its slope: the numbers gather speed. While nothing
 //! sounds, new settings hold at once.

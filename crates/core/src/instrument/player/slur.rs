@@ -43,6 +43,8 @@ const SOONER: f64 = 0.5;
 /// The same for each unit by which the settings damp the reed less. With it and [`FIRMER_FREE`], of 280 slurs of the preset *Doina* (0.9) at five
 /// velocities none is wrong after 0.13 s, where 23 were.
 const SOONER_FREE: f64 = 1.0;
+/// With less damping than this below the usual factor nothing more is added: such a reed squeaks on purpose.
+const FREEST: f64 = 0.2;
 /// What the lip adds to the factor on the reed's damping in such slurs, for each unit of a straighter facing.
 const FIRMER: f64 = 3.0;
 /// The same for each unit by which the settings damp the reed less; see [`SOONER_FREE`].
@@ -142,7 +144,12 @@ pub struct Slur {
 impl Slur {
     /// By how much less mouth over closing pressure the reed holds on to the old mode than the reed for which this was measured.
     fn sooner(&self) -> f64 {
-        SOONER * self.straighter() + SOONER_FREE * (1.0 - self.damping).max(0.0)
+        SOONER * self.straighter() + SOONER_FREE * self.freer()
+    }
+
+    /// By how much less the settings damp the reed, up to what was tried.
+    fn freer(&self) -> f64 {
+        (1.0 - self.damping).clamp(0.0, FREEST)
     }
 
     /// By how much straighter the facing is than the one for which this was measured.
@@ -181,9 +188,8 @@ impl Slur {
 
     /// What the lip does in a leap that begins at the mouth.
     fn leap_help(&self) -> LipHelp {
-        let freer = (1.0 - self.damping).max(0.0);
-        let damping =
-            (DAMPED.damping + FIRMER * self.straighter() + FIRMER_FREE * freer) / self.damping.min(1.0);
+        let freer = self.freer();
+        let damping = (DAMPED.damping + FIRMER * self.straighter() + FIRMER_FREE * freer) / (1.0 - freer);
         LipHelp { damping, length_s: DAMPED.length_s }
     }
 

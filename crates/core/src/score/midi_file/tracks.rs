@@ -82,7 +82,7 @@ pub fn read_tracks(
         let (channel, midi) = match message.kind {
             TrackEventKind::Midi { channel, message } => (channel.as_int(), message),
             TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
-                clock.set_tempo(us.as_int());
+                clock.set_tempo(us.as_int(), &message)?;
                 continue;
             }
             _ => continue,

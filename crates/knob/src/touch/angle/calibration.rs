@@ -5,9 +5,9 @@
 //! steps of 0.1 degrees and a hand whose tremor moves it by half a degree.
 
 use chalumeau_core::haptics::FeelDesign;
+use chalumeau_core::maths;
 
 use crate::touch::angle::KnobDesign;
-use chalumeau_core::maths;
 
 /// How long *Rest* listens, s.
 pub const REST_S: f64 = 1.0;
