@@ -310,7 +310,7 @@ const TESTS = {
       await silence(page);
       // FEEL has arrived, the knob stands at its zero, and nothing but the user's own click arms.
       await page.click('#knob-zero');
-      await until(page, 8, -0.1, 0.1);
+      await page.waitForFunction(() => /^-?0°/.test(document.getElementById('knob-numbers').textContent));
       await page.waitForFunction(() => !document.getElementById('knob-arm').disabled && globalThis.chalumeau.knob.knob.strayDeg === null);
       for (let time = 0; time < 2; time += 1) {
         await page.evaluate(() => document.getElementById('knob-arm').click());

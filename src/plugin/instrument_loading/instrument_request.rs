@@ -54,7 +54,7 @@ pub struct InstrumentRequest {
     pub keys: Arc<KeyPitches>,
     /// What the user has altered.
     pub alterations: Arc<Alterations>,
-    /// What names the instrument in a saved project, see [`InstrumentParams::key`](crate::plugin::params::instrument::InstrumentParams::key).
+    /// What names the instrument in a saved project, see `InstrumentParams::key`.
     pub key: String,
 }
 
