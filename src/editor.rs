@@ -397,6 +397,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             return;
         }
         if presets.is_open {
+            presets.has_keys = keyboard.has_letters();
             presets.draw(ui, &mut hands, snapshot, &mut actions);
             return;
         }

@@ -42,6 +42,8 @@ pub struct PresetBrowser {
     seen: Range<usize>,
     /// The preset that was chosen in the frame before.
     chosen: String,
+    /// The window has no host, whose keys they would be: arrow keys choose.
+    pub has_keys: bool,
 }
 
 /// What is being typed.
@@ -165,7 +167,7 @@ impl PresetBrowser {
         ui.spacing_mut().item_spacing.y = 0.0;
         let mut area = egui::ScrollArea::vertical().id_salt("presets").auto_shrink([false, false]);
         // The arrows choose while nothing else has the focus.
-        let is_free = ui.memory(|memory| memory.focused().is_none());
+        let is_free = self.has_keys && ui.memory(|memory| memory.focused().is_none());
         let pressed = |key| ui.input_mut(|input| input.consume_key(egui::Modifiers::NONE, key));
         for (key, by) in [(Key::ArrowDown, 1), (Key::ArrowUp, -1)] {
             if is_free

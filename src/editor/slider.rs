@@ -129,10 +129,6 @@ pub fn moved_by_pointer(
 ) -> Option<f32> {
     // Where the hand would be on a control without steps: else a stepped one never leaves its step.
     let exact = response.id.with("exact");
-    if response.clicked() || response.drag_started() {
-        // The arrow keys go on from there.
-        response.request_focus();
-    }
     if response.drag_started() {
         hands.begin(id);
         ui.data_mut(|data| data.insert_temp(exact, look.value));

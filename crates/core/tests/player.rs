@@ -263,13 +263,14 @@ fn a_hard_attack_begins_louder_and_goes_on_as_any() {
     }
 }
 
-/// As in the presets *Glass facing*, *Keys, bright tongue* and *Doina*.
+/// As in the presets *Glass facing*, *Keys, bright tongue* and *Doina*, and a lip that damps as little as the player makes up for.
 #[test]
 fn slurs_down_over_the_break_arrive_on_straighter_facings_and_freer_reeds() {
     let reeds = [
         Settings { lay: 0.0, strength: 3.5, zeta: 0.4, damping: 1.1, ..still() },
         Settings { lay: 0.3, strength: 3.0, zeta: 0.36, legato_ms: 7.0, ..still() },
         Settings { strength: 2.25, lip: 1.05, damping: 0.9, legato_ms: 12.0, breath_curve: 1.4, ..still() },
+        Settings { damping: 0.8, ..still() },
     ];
     let mut slurs = Vec::new();
     for reed in 0..reeds.len() {
@@ -286,7 +287,7 @@ fn slurs_down_over_the_break_arrive_on_straighter_facings_and_freer_reeds() {
     let lost: Vec<_> =
         slurs.iter().zip(&stuck).filter(|(_, is_stuck)| **is_stuck).map(|(slur, _)| slur).collect();
     println!("{} of {} slurs stay on the old mode: {lost:?}", lost.len(), slurs.len());
-    assert!(lost.len() <= slurs.len() / 200, "{lost:?}");
+    assert!(lost.is_empty(), "{lost:?}");
 }
 
 #[test]

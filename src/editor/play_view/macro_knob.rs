@@ -19,7 +19,7 @@ const TRAVEL: f32 = 160.0;
 const KEYS: KeySteps = KeySteps { share: 0.02, has_vertical: true };
 /// The arc, from its low end to its high end, radians clockwise from the right.
 const ARC: (f32, f32) = (0.75 * std::f32::consts::PI, 2.25 * std::f32::consts::PI);
-const HOW: &str = "Drag up or down, or the arrow keys; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
+const HOW: &str = "Drag up or down, or press the arrow keys once Tab has brought you here; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
 /// Size of the field for a typed value, points.
 const FIELD: Vec2 = vec2(84.0, 24.0);
 /// Between an arc and the edge of its place: the tick at the default, and a gap, points.
