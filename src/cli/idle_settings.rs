@@ -4,7 +4,7 @@ use crate::cli::settings::SettingsArgs;
 use crate::cli::{Failure, score_args::BreathSource};
 use chalumeau_core::instrument::listening::ListeningMode;
 use chalumeau_core::instrument::techniques::GrowlPitch;
-use chalumeau_core::instrument::{BreathResponse, Settings};
+use chalumeau_core::instrument::{BreathResponse, Settings, Split};
 
 /// A setting that was given and has no effect.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ struct Need {
     why: &'static str,
 }
 
-const NEEDS: [Need; 13] = [
+const NEEDS: [Need; 14] = [
     Need {
         ids: &["bcurve", "bsoft", "bloud"],
         is_met: |settings, _| settings.breath_response == BreathResponse::Played,
@@ -99,6 +99,12 @@ const NEEDS: [Need; 13] = [
         is_met: |settings, _| settings.room.amount > 0.0,
         may_be_played: false,
         why: "is for a room, and there is none; add --room",
+    },
+    Need {
+        ids: &["late"],
+        is_met: |settings, _| settings.players.count > 1 && settings.players.split == Split::Unison,
+        may_be_played: false,
+        why: "is for several players in unison; add --players and --set split=unison",
     },
     Need {
         ids: &["spread", "seats"],

@@ -212,7 +212,7 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         ui.label(egui::RichText::new(alone).font(theme::small()).color(c.quiet));
     }
     choice(ui, hands, "split");
-    for id in ["spread", "seats"] {
+    for id in ["spread", "late", "seats"] {
         slider(ui, hands, id);
     }
 }

@@ -358,7 +358,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "All notes stop, and the keys set the breath again; a room rings on. As a parameter it acts when it is switched on, and is Off again.",
             "",
         )
-        .midi("CC120, CC123")
+        .midi("CC120")
         .act()
         .never_restored(),
     entry(
@@ -941,7 +941,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("player", PLAYERS, "Players", whole([1, 16], 1, ""))
         .help(
             "How many players play the instrument",
-            "Each has a wander, a tuning and a seat of its own. The output stays about as loud when all play. Eight cost some five times as much as one.",
+            "Each has a wander, a tuning and a seat of its own, and in unison its own moment. The output stays about as loud when all play. Eight cost some five times as much as one.",
             "",
         )
         .sets(Sets::Whole(|settings| &mut settings.players.count))
@@ -953,7 +953,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "",
         )
         .sets(Sets::Choice(|settings, at| settings.players.split = nth(at, Split::ALL))),
-    entry("spread", PLAYERS, "Spread", number([0.0, 25.0], 6.0, 1, " cents"))
+    entry("spread", PLAYERS, "Tuning spread", number([0.0, 25.0], 6.0, 1, " cents"))
         .help(
             "How far the players are out of tune with the first, at most, either way",
             "They beat with each other; more is a street band.",
@@ -961,6 +961,14 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::PlayersSpreadCents))
         .flag("--spread"),
+    entry("late", PLAYERS, "Onset spread", number([0.0, 60.0], 25.0, 0, " ms"))
+        .help(
+            "In unison: how much later than the first player the others begin their notes, at most",
+            "Each note differs. At 0, all begin at the same moment, with an accent that no section has.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::PlayersOnsetSpreadMs))
+        .flag("--onset-spread"),
     entry("seats", PLAYERS, "Seats", percent(0.7))
         .help(
             "How far apart the players sit, on two channels",

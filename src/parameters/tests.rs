@@ -115,7 +115,8 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("tractp", "Techniques", "Tract interval", "0.0 st", true),
     ("player", "Players", "Players", "1", true),
     ("split", "Players", "Split", "Chords", true),
-    ("spread", "Players", "Spread", "6.0 cents", true),
+    ("spread", "Players", "Tuning spread", "6.0 cents", true),
+    ("late", "Players", "Onset spread", "25 ms", true),
     ("seats", "Players", "Seats", "70.0 %", true),
     ("mic", "Microphone", "Microphone", "Off", false),
     ("miccal", "Microphone", "Calibrate microphone", "Off", false),
@@ -308,9 +309,9 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
                 subtone: _,
             },
         tract: Tract { amount: _, interval_semitones: _ },
-        players: Players { count: _, split: _, spread_cents: _, width: _ },
+        players: Players { count: _, split: _, spread_cents: _, onset_spread_ms: _, width: _ },
     } = d;
-    assert_eq!(fields, 63);
+    assert_eq!(fields, 64);
 }
 
 #[test]

@@ -61,6 +61,7 @@ pub const NUMBERS: [N; 51] = [
     N::TractAmount,
     N::TractIntervalSemitones,
     N::PlayersSpreadCents,
+    N::PlayersOnsetSpreadMs,
     N::PlayersWidth,
 ];
 /// Switches, choices and whole numbers.

@@ -369,3 +369,39 @@ fn a_key_that_hardly_goes_down_plays_a_short_note_and_no_click() {
         }
     }
 }
+
+/// Above the break a note takes longer to speak than such a key is down.
+#[test]
+fn a_short_key_is_about_as_loud_as_a_long_one() {
+    for note in (50..=90).map(SoundingNote) {
+        for velocity in [0.25, 0.6, 0.9] {
+            let loudest = |seconds: f64| {
+                let key = [(0.1, Event::NoteOn { note, velocity }), (0.1 + seconds, Event::NoteOff { note })];
+                let sound = heard(&still(Articulation::default()), &key, 0.5);
+                let power = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64;
+                10.0 * sound.windows(384).step_by(48).map(power).fold(1e-30, f64::max).log10()
+            };
+            let long = loudest(0.3);
+            for ms in [1.0, 10.0, 30.0, 50.0] {
+                let short = loudest(1e-3 * ms) - long;
+                assert!(short.abs() < 9.0, "{note:?}, velocity {velocity}, {ms} ms: {short:.1} dB");
+            }
+        }
+    }
+}
+
+/// The tongue lets go of a reed on which no pressure rests so slowly that the air column does not pop.
+#[test]
+fn keys_without_breath_are_silent() {
+    let gesture = |breath: f32| {
+        let mut events = vec![(0.0, Event::Breath(0.5)), (0.05, Event::Breath(breath))];
+        for (nth, key) in [52, 60, 69, 79, 84].into_iter().enumerate() {
+            let begun = 0.3 + 0.3 * nth as f64;
+            events.extend([on(begun, key), off(begun + 0.2, key)]);
+        }
+        let sound = heard(&still(Articulation::default()), &events, 1.9);
+        20.0 * sound[12_000..].iter().fold(0.0_f64, |most, x| most.max(x.abs())).log10()
+    };
+    let (blown, not_blown) = (gesture(0.5), gesture(0.0));
+    assert!(not_blown < blown - 40.0, "{not_blown:.1} and {blown:.1} dB");
+}

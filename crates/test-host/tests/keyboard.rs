@@ -68,7 +68,7 @@ fn after_a_start_that_sends_every_controller_the_first_key_sounds_by_velocity() 
         for times in [1, 2] {
             for velocity in [30, 120] {
                 let mut said = every_controller(0, value);
-                // CC120 and CC123 are among them, and they are meant.
+                // CC120 is among them, and it is meant.
                 let mut events = vec![(0, Event::Panic)];
                 if times == 2 {
                     said.extend(every_controller(256, |number| 127 - value(number)));

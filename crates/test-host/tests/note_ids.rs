@@ -334,9 +334,16 @@ const CASES: &[Case] = &[
         &[ONE],
     ),
     case(
-        "CC123 ends all at once",
-        &[strike(1, 60), strike(2, 64), Say::Midi([0xB0, 123, 0])],
+        "CC120 ends all at once",
+        &[strike(1, 60), strike(2, 64), Say::Midi([0xB0, 120, 0])],
         &[(0, on(60)), (1, on(64)), (2, Event::Panic)],
+        None,
+        &[ONE, TWO],
+    ),
+    case(
+        "CC123 lifts all keys",
+        &[strike(1, 60), strike(2, 64), Say::Midi([0xB0, 123, 0])],
+        &[(0, on(60)), (1, on(64)), (2, off(60)), (2, off(64))],
         None,
         &[ONE, TWO],
     ),

@@ -18,6 +18,9 @@ pub struct PlayersParams {
     /// [`Players::spread_cents`].
     #[id = "spread"]
     pub spread: FloatParam,
+    /// [`Players::onset_spread_ms`].
+    #[id = "late"]
+    pub onset_spread: FloatParam,
     /// [`Players::width`].
     #[id = "seats"]
     pub seats: FloatParam,
@@ -47,6 +50,7 @@ impl PlayersParams {
             count: whole("player"),
             split: choice("split"),
             spread: number("spread"),
+            onset_spread: number("late"),
             seats: number("seats"),
         }
     }
@@ -57,6 +61,7 @@ impl PlayersParams {
             count: self.count.value(),
             split: self.split.value().into(),
             spread_cents: settled(&self.spread),
+            onset_spread_ms: settled(&self.onset_spread),
             width: settled(&self.seats),
         }
     }

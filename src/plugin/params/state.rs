@@ -23,12 +23,14 @@ use crate::presets::{NAME_MOST, Preset, factory};
 /// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
 /// is the B flat clarinet. 3: listening; a state of 1 or 2 is heard as from one point. 4: the breath response; in an earlier
 /// state breath is physical and the tuning natural, unless it says otherwise. 5: life and vibrato; in an earlier state a held note
-/// stands still and the mod wheel does nothing.
-pub const SCHEMA: u32 = 5;
+/// stands still and the mod wheel does nothing. 6: the onset spread; in an earlier state all players begin a note at once.
+pub const SCHEMA: u32 = 6;
 const SCHEMA_FIELD: &str = "schema";
 /// Choices that meant something else before a layout, or were not there: id, what it was, and the first layout that has it.
 const BEFORE: [(&str, &str, u32); 4] =
     [("resp", "phys", 4), ("tune", "nat", 4), ("heard", "point", 3), ("wheel", "none", 5)];
+/// Numbers that were 0 before a layout, because they were not there: id, and the first layout that has it.
+const NOT_YET: [(&str, u32); 2] = [("life", 5), ("late", 6)];
 
 /// A number's default in this process: the table's, or what the program was started with.
 pub(super) fn starting(id: &str, number: &Number) -> f32 {
@@ -58,8 +60,10 @@ pub fn mend(state: &mut PluginState) {
             old.entry(id.to_owned()).or_insert_with(|| ParamValue::String(was.to_owned()));
         }
     }
-    if schema.is_some_and(|schema| schema < 5) {
-        old.entry("life".to_owned()).or_insert(ParamValue::F32(0.0));
+    for (id, since) in NOT_YET {
+        if schema.is_some_and(|schema| schema < since) {
+            old.entry(id.to_owned()).or_insert(ParamValue::F32(0.0));
+        }
     }
     for parameter in PARAMETERS {
         let value = mended(parameter, old.remove(parameter.id));
@@ -364,6 +368,21 @@ mod tests {
             };
             mend(&mut state);
             assert!(matches!(&state.params["heard"], ParamValue::String(id) if id == heard), "{schema}");
+        }
+    }
+
+    #[test]
+    fn what_was_saved_before_life_or_the_onset_spread_has_none() {
+        for (schema, life, late) in [("4", 0.0, 0.0), ("5", 1.0, 0.0), ("6", 1.0, 25.0)] {
+            let fields = BTreeMap::from([(SCHEMA_FIELD.to_owned(), schema.to_owned())]);
+            let mut state = PluginState { version: String::new(), params: BTreeMap::new(), fields };
+            mend(&mut state);
+            for (id, wanted) in [("life", life), ("late", late)] {
+                assert!(
+                    matches!(state.params[id], ParamValue::F32(value) if value == wanted),
+                    "{schema} {id}"
+                );
+            }
         }
     }
 }

@@ -235,10 +235,8 @@ impl MidiDecoder {
     /// The pedal and all keys come up. Real-time safe.
     pub fn let_go(&mut self) -> &[Event] {
         self.begin();
-        self.set_pedal(false);
-        let before = self.sounding();
-        self.notes.release(NoteAddress::default(), false);
-        self.hear_next(before);
+        self.pedal = false;
+        self.lift_all();
         self.said.events()
     }
 
@@ -411,6 +409,13 @@ impl MidiDecoder {
         if !is_down && self.notes.take_by_pedal().is_some() {
             self.hear_next(before);
         }
+    }
+
+    fn lift_all(&mut self) {
+        let before = self.sounding();
+        self.notes.release(NoteAddress::default(), false);
+        self.hear_next(before);
+        self.ease_keys();
     }
 
     fn cut_all(&mut self) {

@@ -104,6 +104,8 @@ pub enum SettingNumber {
     TractIntervalSemitones,
     /// `players.spread_cents`.
     PlayersSpreadCents,
+    /// `players.onset_spread_ms`.
+    PlayersOnsetSpreadMs,
     /// `players.width`.
     PlayersWidth,
 }
@@ -125,6 +127,7 @@ impl SettingNumber {
                 | Self::RoomDecayS
                 | Self::RoomTone
                 | Self::PlayersSpreadCents
+                | Self::PlayersOnsetSpreadMs
                 | Self::PlayersWidth
         )
     }

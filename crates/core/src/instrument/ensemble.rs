@@ -1,7 +1,8 @@
 //! Several players of one instrument, each with a voice of its own, and their sum.
 //!
 //! Every player gets the events that are for it, and no other. So a player in an ensemble gives the samples that it gives
-//! alone, to the bit, and voice, player and events stay apart. The players differ as [`Person`]s do, and sit side by
+//! alone, to the bit, and voice, player and events stay apart. The players differ as [`Person`]s do; in unison each is late
+//! in its own way, see [`lateness`]. They sit side by
 //! side: each is panned with constant power, in addition to the pan of its events; from two places each is heard from its
 //! [`Chair`].
 //!
@@ -11,6 +12,7 @@
 //! A player who is silent and at rest sleeps: nothing of it is computed, and it stands still until a note, a slap or a
 //! breath wakes it. Those who are awake play side by side, see [`Choir`](super::voice::choir::Choir). Whether it sleeps is decided on a fixed grid of samples, never on the host's blocks.
 
+mod lateness;
 pub(super) mod section;
 
 use std::sync::Arc;
@@ -29,6 +31,7 @@ use crate::instrument::settings::Settings;
 use crate::instrument::stage::Chair;
 use crate::instrument::stereo::gains;
 use crate::units::{clamped_or, nearest_rate_hz};
+use lateness::Lateness;
 use section::Section;
 
 /// Samples of the host between two decisions whether a player sleeps.
@@ -41,6 +44,7 @@ const MOVE_S: f64 = 0.010;
 /// One player at its seat.
 struct Seat {
     clarinet: Clarinet,
+    lateness: Lateness,
     /// Gains of left and right.
     sides: [Glide; 2],
     /// Pan of the player's events, -1..=1.
@@ -59,9 +63,10 @@ struct Seat {
 }
 
 impl Seat {
-    fn new(clarinet: Clarinet, rate_hz: f64) -> Self {
+    fn new(clarinet: Clarinet, rate_hz: f64, number: u8) -> Self {
         Self {
             clarinet,
+            lateness: Lateness::new(|lone| Person::new(number).seed(lone)),
             sides: [Glide::new(1.0, MOVE_S, rate_hz); 2],
             pan: 0.0,
             at: 0,
@@ -101,13 +106,50 @@ impl Seat {
         }
     }
 
+    /// Takes an event now, or up to so many samples later if it belongs to a note.
+    fn apply_late(&mut self, event: Event, most: f64) {
+        let now = match event {
+            Event::NoteOn { .. } | Event::NoteOff { .. } | Event::TongueSlap { .. } => {
+                self.lateness.take(event, most)
+            }
+            Event::Panic => {
+                self.lateness.forget();
+                Some(event)
+            }
+            // What is cut has begun.
+            Event::Choke { .. } => {
+                while let Some(event) = self.lateness.next() {
+                    self.apply(event);
+                }
+                Some(event)
+            }
+            _ => Some(event),
+        };
+        if let Some(event) = now {
+            self.apply(event);
+        }
+    }
+
+    /// Takes what is due.
+    fn apply_due(&mut self) {
+        while let Some(event) = self.lateness.due() {
+            self.apply(event);
+        }
+    }
+
+    /// All keys come up, and none goes down that waited.
+    fn let_go(&mut self) {
+        self.lateness.forget();
+        self.clarinet.let_go();
+    }
+
     fn wake(&mut self) {
         (self.sleeps, self.quiet, self.is_heard) = (false, 0, false);
     }
 
-    /// Samples until the next decision about sleep.
+    /// Samples until the next decision about sleep, or the next event that is late.
     fn reach(&self) -> usize {
-        CELL - self.at
+        self.lateness.reach().min(CELL - self.at)
     }
 
     /// Where so many samples of one or two channels go, and who plays them.
@@ -132,6 +174,7 @@ impl Seat {
             own.each(|channel| is_heard |= any_above(channel, silence));
             self.is_heard |= is_heard;
         }
+        self.lateness.pass(samples);
         self.at += samples;
         if self.at == CELL {
             self.at = 0;
@@ -142,11 +185,16 @@ impl Seat {
     }
 
     fn is_silent(&self) -> bool {
-        self.sleeps || self.clarinet.is_silent()
+        self.lateness.is_empty() && (self.sleeps || self.clarinet.is_silent())
+    }
+
+    fn is_resting(&self) -> bool {
+        self.lateness.is_empty() && (self.sleeps || self.clarinet.is_resting())
     }
 
     fn reset(&mut self) {
         self.clarinet.reset();
+        self.lateness.reset();
         (self.pan, self.is_heard, self.quiet) = (0.0, false, 0);
         self.sleeps = self.may_sleep;
     }
@@ -192,6 +240,7 @@ fn add_with(sum: &mut [f32], own: &[f32], gain: &[f32], mut side: impl FnMut() -
 pub struct Ensemble {
     /// All there can be, so that a change of their number allocates nothing.
     seats: Vec<Seat>,
+    rate_hz: f64,
     players: Players,
     /// Loudness of each.
     gain: Glide,
@@ -218,7 +267,11 @@ impl Ensemble {
         }
         let section = Section::new(clarinets[0].model());
         let mut ensemble = Self {
-            seats: clarinets.into_iter().map(|clarinet| Seat::new(clarinet, host_rate_hz)).collect(),
+            seats: (0..)
+                .zip(clarinets)
+                .map(|(number, clarinet)| Seat::new(clarinet, host_rate_hz, number))
+                .collect(),
+            rate_hz: host_rate_hz,
             players: Players::default(),
             gain: Glide::new(1.0, MOVE_S, host_rate_hz),
             limiter: Limiter::new(host_rate_hz),
@@ -259,7 +312,7 @@ impl Ensemble {
         let stay = if before.split == players.split { before.number().min(players.number()) } else { 1 };
         let (first, others) = self.seats.split_at_mut(stay);
         for seat in others {
-            seat.clarinet.let_go();
+            seat.let_go();
             seat.clarinet.follow(&first[0].clarinet);
             seat.pan = first[0].pan;
         }
@@ -313,6 +366,11 @@ impl Ensemble {
             };
             return self.set_number(number, value, player);
         }
+        // The first one is in time for the hands that play.
+        let late = |number: usize| match self.players.split {
+            Split::Unison if number > 0 => 1e-3 * f64::from(self.players.onset_spread_ms) * self.rate_hz,
+            _ => 0.0,
+        };
         for (number, seat) in self.seats.iter_mut().enumerate() {
             let is_meant = match number < count {
                 true => all || to == To::Player(number as u8),
@@ -322,7 +380,7 @@ impl Ensemble {
             if !is_meant {
                 continue;
             }
-            seat.apply(event);
+            seat.apply_late(event, late(number));
             if let Event::Pan { position } = event {
                 seat.pan = clamped_or(position, -1.0, 1.0, 0.0);
                 if count > 1 {
@@ -341,6 +399,7 @@ impl Ensemble {
                 seat.clarinet.set_settings(before.clarinet.settings());
             }
             seat.clarinet.carry_on(&before.clarinet);
+            seat.lateness.carry_on(&before.lateness);
             (seat.pan, seat.sides) = (before.pan, before.sides);
             if !before.sleeps {
                 seat.wake();
@@ -365,8 +424,9 @@ impl Ensemble {
         }
         let (mut begin, samples) = (0, out.len());
         while begin < samples {
-            // All seats are at the same place of their cells.
-            let end = samples.min(begin + self.seats[0].reach());
+            self.seats.iter_mut().for_each(Seat::apply_due);
+            let reach = self.seats.iter().map(Seat::reach).min().unwrap_or(CELL);
+            let end = samples.min(begin + reach);
             self.mix(out.part(begin..end));
             begin = end;
         }
@@ -497,7 +557,7 @@ impl Ensemble {
 
     /// True while no key sounds and nobody blows; the instruments may still ring.
     pub fn is_resting(&self) -> bool {
-        self.seats.iter().all(|seat| seat.sleeps || seat.clarinet.is_resting())
+        self.seats.iter().all(Seat::is_resting)
     }
 
     /// True when the output is silent and all players rest: the host may stop calling.

@@ -382,7 +382,7 @@ impl Player {
     pub fn end_choke(&mut self) {
         self.breath = self.breath.carried();
         self.inflection.cut();
-        if !self.tongue.is_holding() {
+        if self.keys.is_empty() || !self.tongue.is_holding() {
             self.tongue = Tongue::default();
         }
     }
@@ -501,9 +501,9 @@ impl Player {
         !self.tongue.is_slapping() && self.breath.is_resting(self.holds_note())
     }
 
-    /// Whether a note is to sound: a key is down, or the note of the last one falls.
+    /// Whether a note is to sound: a key is down, or the note of the last one falls or has yet to speak.
     fn holds_note(&self) -> bool {
-        !self.keys.is_empty() || self.inflection.is_falling()
+        !self.keys.is_empty() || self.inflection.is_falling() || self.tongue.is_due()
     }
 
     /// The breath that comes in during this tick, Pa at 1 m, if any.
@@ -575,7 +575,7 @@ impl Player {
         if self.inflection.tick(self.tongue.is_holding(), gamma, articulation, tick_s) {
             self.tongue.stop();
         }
-        let key_down = !self.keys.is_empty() || self.inflection.is_falling();
+        let key_down = !self.keys.is_empty() || self.inflection.is_falling() || self.tongue.is_due();
         let tongue_holds = self.tongue.is_holding();
         let asked = self.breath.asked(key_down);
         self.ear.hear(voice.p_mouthpiece() / posture.closing, posture.lags.ear);
@@ -616,7 +616,8 @@ impl Player {
         let shaken = self.techniques.shake(gamma, note_hz * self.tuning.speed(), settings, tick_s);
         let hardness =
             self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
-        let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, &self.ear, &context);
+        let (p_mouth, tongue) =
+            self.tongue.tick(shaken, hardness, &self.ear, || self.response.hears(&self.ear), &context);
         let beside_cents = self.slide.as_ref().map_or(0.0, Slide::beside_cents);
         let added_cents = (sway.cents, self.inflection.cents() + beside_cents);
         let has_other_speed = self.tuning.tick(fingering, gamma, added_cents, &context, model, lattice);

@@ -30,13 +30,16 @@ pub struct Players {
     pub split: Split,
     /// How far out of tune they are, cents either way, 0..=25; the first one is in tune. Default 6 (by judgement).
     pub spread_cents: f32,
+    /// In unison, how much later than the first one the others begin their notes at most, ms, 0..=60; each note differs. Default
+    /// 25 (by judgement; see [`ensemble`](super::ensemble)).
+    pub onset_spread_ms: f32,
     /// How wide they sit, 0 (all in the middle)..=1 (from side to side). Default 0.7 (by judgement).
     pub width: f32,
 }
 
 impl Default for Players {
     fn default() -> Self {
-        Self { count: 1, split: Split::Chords, spread_cents: 6.0, width: 0.7 }
+        Self { count: 1, split: Split::Chords, spread_cents: 6.0, onset_spread_ms: 25.0, width: 0.7 }
     }
 }
 
@@ -48,6 +51,7 @@ impl Players {
             count: self.count.clamp(1, MOST_PLAYERS as i32),
             split: self.split,
             spread_cents: clamped_or(self.spread_cents, 0.0, 25.0, d.spread_cents),
+            onset_spread_ms: clamped_or(self.onset_spread_ms, 0.0, 60.0, d.onset_spread_ms),
             width: clamped_or(self.width, 0.0, 1.0, d.width),
         }
     }

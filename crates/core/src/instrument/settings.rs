@@ -285,6 +285,7 @@ impl Settings {
             SettingNumber::TractAmount => &mut self.tract.amount,
             SettingNumber::TractIntervalSemitones => &mut self.tract.interval_semitones,
             SettingNumber::PlayersSpreadCents => &mut self.players.spread_cents,
+            SettingNumber::PlayersOnsetSpreadMs => &mut self.players.onset_spread_ms,
             SettingNumber::PlayersWidth => &mut self.players.width,
         }
     }

@@ -76,7 +76,9 @@ impl MidiDecoder {
             EXPRESSION => self.hear(BreathController::Expression, at, Part::Coarse(value), place, false),
             EXPRESSION_FINE => self.hear(BreathController::Expression, at, Part::Fine(value), place, false),
             // A host that stops behind a snapshot means it.
-            ALL_SOUND_OFF | ALL_NOTES_OFF => self.cut_all(),
+            ALL_SOUND_OFF => self.cut_all(),
+            // So are notes that a pedal holds: a host that stops leaves none. The pedal itself stays where it is.
+            ALL_NOTES_OFF => self.lift_all(),
             _ if matches!(place, Place::Recognised | Place::Within) => {}
             _ => self.control(at, cc, value),
         }

@@ -307,7 +307,21 @@ fn no_input_is_wrong() {
         }
     }
     assert_eq!(midi.controller(0, 120, 0)[0], Event::Panic);
-    assert_eq!(midi.controller(0, 123, 0)[0], Event::Panic);
+    midi.note_on(0, 60, 90);
+    assert_eq!(midi.controller(0, 123, 0), [off(60)]);
+}
+
+#[test]
+fn all_notes_off_ends_keys_and_what_the_pedal_holds_on_any_channel_and_cuts_nothing() {
+    let mut midi = MidiDecoder::new();
+    midi.controller(0, 64, 127);
+    for note in [60, 64] {
+        midi.note_on(0, note, 90);
+    }
+    assert_eq!(midi.controller(9, 123, 0), [off(60), off(64)]);
+    midi.note_on(0, 67, 90);
+    assert_eq!(midi.note_off(0, 67), NOTHING, "the pedal is down");
+    assert_eq!(midi.controller(9, 123, 0), [off(67)]);
 }
 
 /// A member's full wheel, and a manager's.
@@ -431,7 +445,8 @@ fn pressed_keys_are_eased_when_pressure_becomes_something_else() {
     assert_eq!(pressed().set_breath_from(BreathFrom::Keys), [Event::BreathFromKeys, EASED]);
     assert_eq!(pressed().controller(0, 121, 0), [bend(0.0), EASED]);
     assert_eq!(pressed().other_pressure(0), [EASED]);
-    assert_eq!(pressed().controller(0, 123, 0), [Event::Panic, EASED]);
+    assert_eq!(pressed().controller(0, 120, 0), [Event::Panic, EASED]);
+    assert_eq!(pressed().controller(0, 123, 0), [off(60), EASED]);
     let mut linked = pressed();
     linked.set_links(&one_link(Source::Pressure));
     assert_eq!(linked.pressure(0, 0)[0], EASED);
@@ -486,7 +501,7 @@ fn a_panic_leaves_the_wheels_where_they_are() {
     let mut midi = MidiDecoder::new();
     midi.note_on(0, 60, 90);
     midi.bend(0, 16383);
-    assert_eq!(midi.controller(0, 123, 0), [Event::Panic], "and the player keeps what they set");
+    assert_eq!(midi.controller(0, 120, 0), [Event::Panic], "and the player keeps what they set");
     assert_eq!(midi.note_off(0, 60), NOTHING);
 }
 

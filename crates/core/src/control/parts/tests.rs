@@ -195,13 +195,19 @@ fn expressions_chokes_and_ends_find_their_note() {
 }
 
 #[test]
-fn all_notes_off_is_for_all() {
-    for cc in [120, 123] {
+fn all_notes_off_and_all_sound_off_are_for_all() {
+    const KEYS: [u8; 4] = [60, 64, 67, 70];
+    let playing = || {
         let mut parts = Parts::new(4);
-        chord(&mut parts, &[60, 64, 67, 70]);
-        assert_eq!(said(parts.controller(9, cc, 0)), [0, 1, 2, 3].map(|part| (part, Event::Panic)));
-        assert_eq!(parts.over().len(), 4);
-    }
+        chord(&mut parts, &KEYS);
+        parts
+    };
+    let mut parts = playing();
+    assert_eq!(said(parts.controller(9, 120, 0)), [0, 1, 2, 3].map(|part| (part, Event::Panic)));
+    assert_eq!(parts.over().len(), 4);
+    let mut parts = playing();
+    assert_eq!(said(parts.controller(9, 123, 0)), [0, 1, 2, 3].map(|part| off(part, KEYS[part as usize])));
+    assert_eq!(parts.over(), [], "they fade");
 }
 
 #[test]

@@ -104,7 +104,7 @@ fn a_player_among_others_gives_the_bits_that_it_gives_alone() {
     let (mut sums, gain) = ([(); 2].map(|()| vec![0.0_f32; samples]), 1.0 / f32::from(PLAYERS).sqrt());
     let mut slept = 0;
     for number in 0..PLAYERS {
-        let mut seat = Seat::new(Clarinet::of_player(model.clone(), RATE_HZ, number), RATE_HZ);
+        let mut seat = Seat::new(Clarinet::of_player(model.clone(), RATE_HZ, number), RATE_HZ, number);
         seat.clarinet.set_settings(&Settings { players, ..Settings::default() });
         seat.clarinet.reset();
         let [mut left, mut right] = [(); 2].map(|()| vec![0.0; samples]);
@@ -138,7 +138,7 @@ fn a_player_among_others_gives_the_bits_that_it_gives_alone() {
 #[test]
 fn who_does_not_sleep_is_a_clarinet() {
     let model = Arc::new(Model::built_in(RATE_HZ).unwrap());
-    let mut seat = Seat::new(Clarinet::of_player(model.clone(), RATE_HZ, 5), RATE_HZ);
+    let mut seat = Seat::new(Clarinet::of_player(model.clone(), RATE_HZ, 5), RATE_HZ, 5);
     let mut clarinet = Clarinet::of_player(model, RATE_HZ, 5);
     let ([mut a, mut b], mut heard) = ([[0.0; CELL]; 2], 0.0);
     for cell in 0..400 {
@@ -212,7 +212,7 @@ fn heard(player: u8, players: Players, settings: &Settings) -> [Vec<f32>; 2] {
 #[test]
 fn every_player_is_out_of_tune_by_its_share_of_the_spread() {
     let still = Settings { life: 0.0, noise: 0.0, ..Settings::default() };
-    let players = Players { count: 4, spread_cents: 20.0, width: 0.0, split: Split::Chords };
+    let players = Players { count: 4, spread_cents: 20.0, width: 0.0, ..Players::default() };
     let hz = |player: u8, players| {
         let sound: Vec<f64> = heard(player, players, &still)[0].iter().map(|&x| f64::from(x)).collect();
         pitch::refine_hz(&sound, RATE_HZ, 349.2).unwrap()
@@ -255,7 +255,7 @@ fn a_number_of_one_player_leaves_the_others_alone() {
 fn from_two_places_the_nearer_player_is_louder_and_the_first_is_as_alone() {
     let listening = Listening { mode: ListeningMode::Position, angle_deg: 0.0, ..Listening::default() };
     let still = Settings { life: 0.0, noise: 0.0, listening, ..Settings::default() };
-    let players = Players { count: 3, spread_cents: 0.0, width: 0.7, split: Split::Chords };
+    let players = Players { count: 3, spread_cents: 0.0, width: 0.7, ..Players::default() };
     let powers = [0, 1, 2].map(|player| heard(player, players, &still).map(|side| power(&side)));
     // Distances by hand: the right player is at 0.572 m, 1.4 m; the places at 0.866 m, 0.5 m to either side.
     let wanted = 20.0 * (0.294_f64.hypot(1.9) / 0.294_f64.hypot(0.9)).log10();
@@ -277,7 +277,7 @@ fn from_two_places_the_nearer_player_is_louder_and_the_first_is_as_alone() {
 fn a_pan_moves_who_is_heard_from_two_places() {
     let listening = Listening { mode: ListeningMode::Position, ..Listening::default() };
     let still = Settings { life: 0.0, noise: 0.0, listening, ..Settings::default() };
-    let players = Players { count: 3, spread_cents: 0.0, width: 0.7, split: Split::Chords };
+    let players = Players { count: 3, spread_cents: 0.0, width: 0.7, ..Players::default() };
     for (position, silent, heard) in [(1.0, 0, 1), (-1.0, 1, 0)] {
         let mut section = Ensemble::built_in(RATE_HZ).unwrap();
         section.set_settings(&Settings { players, ..still });
@@ -291,7 +291,8 @@ fn a_pan_moves_who_is_heard_from_two_places() {
 
 #[test]
 fn a_pan_goes_on_where_one_becomes_several_and_where_another_ensemble_takes_over() {
-    let players = |count| Players { count, spread_cents: 0.0, width: 0.0, split: Split::Unison };
+    let players =
+        |count| Players { count, spread_cents: 0.0, onset_spread_ms: 0.0, width: 0.0, split: Split::Unison };
     let settings = |count| Settings { life: 0.0, noise: 0.0, players: players(count), ..Settings::default() };
     let right = |section: &mut Ensemble| {
         let [left, right] = play(section, &[], 24_000, 512).map(|side| power(&side));
@@ -350,7 +351,7 @@ fn a_chord_is_of_players_who_are_heard_with_different_keys() {
 #[test]
 fn players_sit_side_by_side_with_constant_power() {
     let still = Settings { life: 0.0, noise: 0.0, ..Settings::default() };
-    let players = Players { count: 3, spread_cents: 0.0, width: 1.0, split: Split::Chords };
+    let players = Players { count: 3, width: 1.0, spread_cents: 0.0, ..Players::default() };
     let powers = [0, 1, 2].map(|player| heard(player, players, &still).map(|side| power(&side)));
     let [left, right] = [0, 1].map(|side| powers.map(|powers| powers[side]));
     assert!(db(left[0] / right[0]).abs() < 1e-6, "the first in the middle");
@@ -373,7 +374,7 @@ fn a_section_is_as_loud_as_one_and_no_two_of_it_are_the_same() {
         assert!(left.iter().chain(&right).all(|x| x.abs() <= 1.0));
     }
     // Their wander alone, without a spread of the tuning, makes them differ.
-    let players = Players { count: 4, spread_cents: 0.0, width: 0.0, split: Split::Chords };
+    let players = Players { count: 4, width: 0.0, spread_cents: 0.0, ..Players::default() };
     let sounds = [0, 1, 2].map(|player| heard(player, players, &Settings::default())[0].clone());
     for (a, b) in [(0, 1), (0, 2), (1, 2)] {
         assert!(sounds[a] != sounds[b]);
@@ -385,7 +386,7 @@ fn swings_begin_apart() {
     use crate::instrument::Vibrato;
     let vibrato = Vibrato { depth: 1.0, onset_s: 0.0, unevenness: 0.0, ..Vibrato::default() };
     let settings = Settings { life: 0.0, noise: 0.0, vibrato, ..Settings::default() };
-    let players = Players { count: 4, spread_cents: 0.0, width: 0.0, split: Split::Chords };
+    let players = Players { count: 4, width: 0.0, spread_cents: 0.0, ..Players::default() };
     // The level swings by 3 dB: where in its turn, from the first Fourier coefficient of the power.
     let turn = |player: u8| {
         let sound = &heard(player, players, &settings)[0];
@@ -463,4 +464,72 @@ fn a_choke_of_who_sleeps_does_not_cut_the_next_note() {
         out
     };
     assert!(duet(Some(Event::Choke { note: SoundingNote(60) })) == duet(None));
+}
+
+fn section_of(count: i32, onset_spread_ms: f32) -> Ensemble {
+    ensemble(Players { count, split: Split::Unison, onset_spread_ms, ..Players::default() })
+}
+
+#[test]
+fn a_section_begins_without_an_accent() {
+    // Greatest power of 10 ms within the first 0.2 s, over that of the second half second.
+    let accent_db = |onset_spread_ms: f32, key: u8| {
+        let mut section = section_of(8, onset_spread_ms);
+        let note = [Timed { at: 4_800, event: on(key).into() }];
+        let [left, _] = play(&mut section, &note, 52_800, 512);
+        let begun = left[4_800..14_400].windows(480).step_by(48).map(power).fold(0.0, f64::max);
+        db(begun / power(&left[28_800..]))
+    };
+    for key in [50, 57, 65, 74] {
+        let (together, spread) = (accent_db(0.0, key), accent_db(25.0, key));
+        assert!(together > 6.0 && spread < 3.0, "{key}: {together:.1} and {spread:.1} dB");
+    }
+}
+
+#[test]
+fn the_first_of_a_section_is_in_time_and_the_others_are_late_in_their_own_ways() {
+    let mut section = section_of(6, 40.0);
+    section.apply(on(60).into());
+    assert!(!section.is_resting() && !section.is_silent());
+    let mut begun = [None; 6];
+    let mut one = [0.0];
+    for at in 0..1_921 {
+        section.render(&mut one);
+        for (begun, seat) in begun.iter_mut().zip(&section.seats) {
+            if seat.clarinet.player_state().key.is_some() {
+                begun.get_or_insert(at);
+            }
+        }
+    }
+    let begun = begun.map(|at| at.expect("it begins within 40 ms"));
+    assert_eq!(begun[0], 0);
+    let mut apart = begun;
+    apart.sort_unstable();
+    assert!(apart.windows(2).all(|pair| pair[1] - pair[0] > 24), "{begun:?}");
+}
+
+#[test]
+fn a_section_sounds_the_same_in_any_blocks_and_after_a_reset() {
+    let notes: Vec<Timed<PartEvent>> = random(9, 1, 400, 240.0)
+        .into_iter()
+        .map(|event| Timed { at: event.at, event: event.event.event.into() })
+        .collect();
+    let mut section = section_of(4, 25.0);
+    let whole = play(&mut section, &notes, 96_000, 96_000);
+    section.reset();
+    assert!(play(&mut section, &notes, 96_000, 1) == whole);
+    assert!(play(&mut section_of(4, 25.0), &notes, 96_000, 77) == whole);
+}
+
+#[test]
+fn panic_and_choke_leave_no_note_that_waits() {
+    for cut in [Event::Panic, Event::Choke { note: SoundingNote(60) }] {
+        let mut section = section_of(6, 60.0);
+        section.apply(on(60).into());
+        section.apply(cut.into());
+        assert!(section.seats.iter().all(|seat| seat.lateness.is_empty()), "{cut:?}");
+        let mut sound = vec![0.0; 48_000];
+        section.render(&mut sound);
+        assert!(power(&sound[24_000..]) < 1e-12 && section.is_silent(), "{cut:?}");
+    }
 }

@@ -33,6 +33,8 @@ const SOFT_RELEASE: f64 = 2.0;
 /// The lip stays where it is for a smaller change of the dynamic: 0.003 dB.
 const STILL: f64 = 1e-4;
 
+/// A note speaks from this share of the amplitude that is expected: 2 dB less (by judgement).
+const SPEAKS: f64 = 0.8;
 /// No amplitude that is expected is below this, over the closing pressure.
 const QUIETEST: f64 = 1e-6;
 
@@ -97,6 +99,11 @@ impl Response {
             }
             BreathResponse::Played => self.played(asked, ear, bodily, settings, posture),
         }
+    }
+
+    /// Whether the note is about as loud as the player expects it to be; always, where the breath is physical.
+    pub fn hears(&self, ear: &Ear) -> bool {
+        self.lip.is_none() || ear.amplitude() >= SPEAKS * maths::exp(self.expected)
     }
 
     /// How much faster the tongue lets go for an attack, as a factor.

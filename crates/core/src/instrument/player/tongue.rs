@@ -11,6 +11,14 @@ const HOLD_S: f64 = 0.008;
 /// The tongue stays away from the reed for this long at least, s, however short a key is held: about the shortest staccato (by
 /// judgement). Landing earlier, it would find a reed that it has hardly let go.
 const SHORTEST_S: f64 = 0.02;
+/// It stays away for this long at most to let a note speak whose key is up, s: with a key of 50 ms, notes above the break were 5 to
+/// 15 dB softer than with longer keys. With 0.06, some in the altissimo still are, by 9 dB.
+const LATEST_S: f64 = 0.08;
+/// Mouth pressure over the closing pressure below which the tongue moves less quickly, in proportion and down to the least share of its
+/// speed: without breath, a reed that is let go pops as loud as 20 dB below a note.
+const QUIET_GAMMA: f64 = 0.15;
+/// See [`QUIET_GAMMA`].
+const LEAST_SPEED: f64 = 0.05;
 /// How long the tongue takes to reach the reed when it stops a note, s.
 const STOP_S: f64 = 0.005;
 /// Time constant with which the force on the reed grows, s, so that the tongue lands softly.
@@ -42,7 +50,7 @@ enum Position {
 #[derive(Clone, Copy, Debug)]
 pub struct Tongue {
     position: Position,
-    /// Time for which it has been away, s, up to [`SHORTEST_S`].
+    /// Time for which it has been away, s, up to [`LATEST_S`].
     away_s: f64,
     /// The note before still rings, and it lets go in time with that.
     is_in_time: bool,
@@ -58,7 +66,7 @@ impl Default for Tongue {
     fn default() -> Self {
         Self {
             position: Position::Resting,
-            away_s: SHORTEST_S,
+            away_s: LATEST_S,
             is_in_time: false,
             is_due: false,
             slap: None,
@@ -75,13 +83,13 @@ impl Tongue {
         (self.away_s, self.is_due) = (0.0, false);
     }
 
-    /// Stops the note; one that has hardly begun is played first, as short as may be.
+    /// Stops the note; one that has hardly begun is played first, as short as may be. Until it lands it [is due](Self::is_due).
     pub fn stop(&mut self) {
         match self.position {
             // On the reed, where it stays.
             Position::Resting | Position::AwaitingBreath => self.position = Position::Resting,
             Position::Stopping(_) => {}
-            _ if self.away_s < SHORTEST_S => self.is_due = true,
+            _ if self.away_s < LATEST_S => self.is_due = true,
             _ => self.position = Position::Stopping(0.0),
         }
     }
@@ -91,7 +99,7 @@ impl Tongue {
     pub fn slap(&mut self, strength: f32, closing: f64, key_down: bool, gamma: f64) -> bool {
         let Some(slap) = Slap::begin(strength, self.force / closing, self.slap) else { return false };
         self.slap = Some(slap);
-        (self.away_s, self.is_due) = (SHORTEST_S, false);
+        (self.away_s, self.is_due) = (LATEST_S, false);
         self.position = match key_down {
             false => Position::Resting,
             true if gamma < BREATH_GAMMA => Position::AwaitingBreath,
@@ -112,6 +120,11 @@ impl Tongue {
     /// Whether the tongue holds the reed before a note.
     pub fn is_holding(&self) -> bool {
         matches!(self.position, Position::Holding(_) | Position::Listening(_) | Position::InTime(_))
+    }
+
+    /// Whether the key has come up and the note is still to be played.
+    pub fn is_due(&self) -> bool {
+        self.is_due
     }
 
     /// Whether the tongue is away from the reed and leaves it alone.
@@ -138,12 +151,20 @@ impl Tongue {
     }
 
     /// Moves the tongue. `gamma` is the mouth pressure over the closing pressure, `hardness` the factor of
-    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness), and `ear` hears what rings. Gives the pressure at the reed's tip and
+    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness), `ear` hears what rings, and `speaks` whether the note is as loud
+    /// as it should be. Gives the pressure at the reed's tip and
     /// the force on the reed, both over the reference closing pressure.
-    pub fn tick(&mut self, gamma: f64, hardness: f64, ear: &Ear, context: &TickContext<'_>) -> (f64, f64) {
+    pub fn tick(
+        &mut self,
+        gamma: f64,
+        hardness: f64,
+        ear: &Ear,
+        speaks: impl FnOnce() -> bool,
+        context: &TickContext<'_>,
+    ) -> (f64, f64) {
         let (tick_s, closing) = (context.tick_s, context.posture.closing);
         let free_closing = context.posture.free_closing;
-        let share = self.move_on(gamma, hardness, ear, context);
+        let share = self.move_on(gamma, hardness, ear, speaks, context);
         let p_mouth = gamma * closing;
         let force = TONGUE_FORCE * free_closing * share;
         let Some(slap) = &mut self.slap else {
@@ -170,13 +191,21 @@ impl Tongue {
     }
 
     /// Moves on to the next position; gives the share of the full force that the position asks for.
-    fn move_on(&mut self, gamma: f64, hardness: f64, ear: &Ear, context: &TickContext<'_>) -> f64 {
+    fn move_on(
+        &mut self,
+        gamma: f64,
+        hardness: f64,
+        ear: &Ear,
+        speaks: impl FnOnce() -> bool,
+        context: &TickContext<'_>,
+    ) -> f64 {
         let tick_s = context.tick_s;
+        let speed = (gamma / QUIET_GAMMA).clamp(LEAST_SPEED, 1.0);
         let (position, share) = match self.position {
             Position::Resting => (Position::Resting, 1.0),
             Position::Away => {
-                self.away_s = (self.away_s + tick_s).min(SHORTEST_S);
-                let lands = self.is_due && self.away_s == SHORTEST_S;
+                self.away_s = (self.away_s + tick_s).min(LATEST_S);
+                let lands = self.is_due && self.away_s >= SHORTEST_S && (self.away_s == LATEST_S || speaks());
                 self.is_due &= !lands;
                 (if lands { Position::Stopping(0.0) } else { Position::Away }, 0.0)
             }
@@ -189,11 +218,12 @@ impl Tongue {
                 (Position::Leaving(1.0), 1.0)
             }
             Position::Leaving(share) => {
-                let share = share - tick_s * hardness / (1e-3 * f64::from(context.settings.tongue_ms));
+                let share =
+                    share - tick_s * speed * hardness / (1e-3 * f64::from(context.settings.tongue_ms));
                 if share > 0.0 { (Position::Leaving(share), share) } else { (Position::Away, 0.0) }
             }
             Position::Stopping(share) => {
-                let share = (share + tick_s / STOP_S).min(1.0);
+                let share = (share + tick_s * speed / STOP_S).min(1.0);
                 (if share < 1.0 { Position::Stopping(share) } else { Position::Resting }, share)
             }
             Position::AwaitingBreath if gamma < BREATH_GAMMA => (Position::AwaitingBreath, 1.0),

@@ -29,6 +29,7 @@ fn settings(chance: &mut Chance) -> Settings {
         count: counts[chance.below(counts.len())],
         split: if chance.below(2) == 0 { Split::Unison } else { Split::Chords },
         spread_cents: 25.0 * chance.unit(),
+        onset_spread_ms: (90.0 * chance.unit() - 30.0).max(0.0),
         width: chance.unit(),
     };
     settings.listening = Listening {
