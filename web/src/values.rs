@@ -10,7 +10,7 @@ use chalumeau_core::instrument::{
 };
 
 /// The numbers, in the order of the list.
-pub const NUMBERS: [N; 51] = [
+pub const NUMBERS: [N; 52] = [
     N::BreathFullKpa,
     N::TongueMs,
     N::LegatoMs,

@@ -1,28 +1,37 @@
 //! A longer lower joint: four semitones more, down to written C3, as bass clarinets have it.
 //!
-//! Below the lowest hole the bore goes on as a tube of the width that it has there; then come the old flare and bell. In this tube stand
-//! four pads, open at rest. The key of each low note closes its own pad and all above it.
+//! Behind the lowest hole the bore narrows to the width that it has before its flare and goes on as a tube; then it widens again to the
+//! old end and bell. In this tube stand four pads, open at rest. The key of each low note closes its own pad and all above it.
+//!
+//! A tube of the width that the bore has at that hole would be wider than the rest. It put the second and third mode of the lowest note 190
+//! and 202 cents below its harmonics, now 54 and 44: for 0.15 s, the note began up to 1.8 semitones flat.
 
 use crate::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, ToneHole};
 use crate::units::WrittenNote;
 
 /// The lowest hole of the ordinary clarinet. Behind it the tube begins.
 const LOWEST_HOLE: &str = "E_PAD";
-/// Length of the tube, m, on a clarinet of twice the B flat clarinet's size; so are all lengths here.
+/// Length from there to the old end, m, on a clarinet of twice the B flat clarinet's size; so are all lengths here.
 ///
 /// It and the places of the holes follow from the transfer-matrix model at 25 C: written E3 has its resonance 9 cents above equal
 /// temperament, as before, and each note below it 10 cents, as `chalumeau instrument check` says. Not a measured instrument.
-const TUBE_M: f64 = 0.3969;
+const TUBE_M: f64 = 0.296_96;
+/// Radius of the tube, m: that of the bore before its flare.
+const TUBE_RADIUS_M: f64 = 0.0146;
+/// Where it narrows behind the lowest hole, from and to, m, clear of that hole, and how far before its end it widens again, m (by judgement).
+const NARROWS_M: (f64, f64) = (0.010, 0.030);
+/// See [`NARROWS_M`].
+const WIDENS_M: f64 = 0.060;
 /// The holes: name, place in m from the tip of the reed, and what key closes it.
 const HOLES: [(&str, f64, &str); 4] = [
-    ("LOW_EB_PAD", 1.1892, "low E flat key"),
-    ("LOW_D_PAD", 1.2842, "low D key"),
-    ("LOW_CS_PAD", 1.3825, "low C# key"),
-    ("LOW_C_PAD", 1.4829, "low C key"),
+    ("LOW_EB_PAD", 1.157_19, "low E flat key"),
+    ("LOW_D_PAD", 1.221_37, "low D key"),
+    ("LOW_CS_PAD", 1.289_35, "low C# key"),
+    ("LOW_C_PAD", 1.365_07, "low C key"),
 ];
-/// Radius and chimney of these holes, m: nearly as wide as the tube, and low. With holes of 24.5 mm, as the one above them has, waves of
-/// the highest notes reach the bell, and its echoes lie among the modes of A6, B6 and C7: these were lost at some breaths.
-const RADIUS_M: f64 = 0.017;
+/// Radius and chimney of these holes, m: nearly as wide as the tube, and low. Through narrower holes, waves of the highest notes reach the
+/// bell, and its echoes lie among the modes of A6, B6 and C7: with holes of 24.5 mm in a tube of 36 mm, these were lost at some breaths.
+const RADIUS_M: f64 = 0.0135;
 const CHIMNEY_M: f64 = 0.006;
 /// The new notes from the lowest up, and the key that the right thumb or little finger presses. It stands for all keys above it.
 const NOTES: [(WrittenNote, &str); 4] = [
@@ -45,14 +54,26 @@ pub(super) fn extended(mut file: InstrumentFile) -> InstrumentFile {
     let from_m = file.holes[lowest].x_m;
     // A cone ends at this hole.
     let behind = file.bore.partition_point(|segment| segment.x_start_m < from_m);
-    let Some(flare) = file.bore.get(behind) else { return file };
+    let Some(flare) = file.bore.get(behind).cloned() else { return file };
     // To a nanometre and by way of millimetres, as the file has it: without the digits that an addition adds.
-    let moved = |x_m: f64| ((x_m + TUBE_M) * 1e9).round() / 1e6 / 1e3;
-    let tube = BoreSegment { x_end_m: moved(flare.x_start_m), r_end_m: flare.r_start_m, ..flare.clone() };
+    let rounded = |x_m: f64| (x_m * 1e9).round() / 1e6 / 1e3;
+    let ends = [
+        (NARROWS_M.0, flare.r_start_m),
+        (NARROWS_M.1, TUBE_RADIUS_M),
+        (TUBE_M - WIDENS_M, TUBE_RADIUS_M),
+        (TUBE_M, flare.r_start_m),
+    ];
     for segment in &mut file.bore[behind..] {
-        (segment.x_start_m, segment.x_end_m) = (moved(segment.x_start_m), moved(segment.x_end_m));
+        (segment.x_start_m, segment.x_end_m) =
+            (rounded(segment.x_start_m + TUBE_M), rounded(segment.x_end_m + TUBE_M));
     }
-    file.bore.insert(behind, tube);
+    let mut begins = (flare.x_start_m, flare.r_start_m);
+    let tube = ends.map(|(behind_m, r_m)| {
+        let (x_start_m, r_start_m) =
+            std::mem::replace(&mut begins, (rounded(flare.x_start_m + behind_m), r_m));
+        BoreSegment { x_start_m, r_start_m, x_end_m: begins.0, r_end_m: begins.1, ..flare.clone() }
+    });
+    file.bore.splice(behind..behind, tube);
     file.holes.extend(HOLES.map(|(name, x_m, key)| ToneHole {
         name: name.to_owned(),
         kind: HoleKind::PadOpen,
