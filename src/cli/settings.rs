@@ -512,7 +512,7 @@ mod tests {
             assert_eq!(read(&["--set", &format!("{}={text}{}", parameter.id, number.unit)]), Ok(by_flag));
             given += 1;
         }
-        assert_eq!(given, 51, "all numbers of the settings have a flag");
+        assert_eq!(given, 52, "all numbers of the settings have a flag");
         assert_eq!(read(&["--set", "tune=tempered"]), read(&["--tempered"]));
         assert_eq!(read(&["--set", "tune=natural"]), read(&["--natural"]));
         assert_eq!(read(&["--set", "resp=physical"]), Ok(Settings::physical()));

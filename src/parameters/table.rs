@@ -961,7 +961,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::PlayersSpreadCents))
         .flag("--spread"),
-    entry("late", PLAYERS, "Onset spread", number([0.0, 60.0], 25.0, 0, " ms"))
+    entry("late", PLAYERS, "Onset spread", number([0.0, 60.0], 25.0, 1, " ms"))
         .help(
             "In unison: how much later than the first player the others begin their notes, at most",
             "Each note differs. At 0, all begin at the same moment, with an accent that no section has.",

@@ -116,7 +116,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("player", "Players", "Players", "1", true),
     ("split", "Players", "Split", "Chords", true),
     ("spread", "Players", "Tuning spread", "6.0 cents", true),
-    ("late", "Players", "Onset spread", "25 ms", true),
+    ("late", "Players", "Onset spread", "25.0 ms", true),
     ("seats", "Players", "Seats", "70.0 %", true),
     ("mic", "Microphone", "Microphone", "Off", false),
     ("miccal", "Microphone", "Calibrate microphone", "Off", false),

@@ -26,7 +26,7 @@ const SLIDERS: &[(Tab, &[&str])] = &[
         Tab::Sound,
         &[
             "a4", "noise", "zeta", "lay", "vent", "gain", "room", "rsize", "rdecay", "rtone", "player",
-            "spread", "seats",
+            "spread", "late", "seats",
         ],
     ),
     (
@@ -76,7 +76,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 108);
+    assert_eq!(host.ids().len(), 109);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())

@@ -783,7 +783,7 @@ fn the_play_view_says_which_instrument_is_loaded() {
     window.harness.get_by_label("B flat clarinet, Boehm system, in B flat, 67 cm long");
     window.snapshot.borrow_mut().instrument = Bundled::Bass.file().into();
     window.harness.run();
-    window.harness.get_by_label("B flat bass clarinet to low C, Boehm system, in B flat, 173 cm long");
+    window.harness.get_by_label("B flat bass clarinet to low C, Boehm system, in B flat, 163 cm long");
 }
 
 #[test]

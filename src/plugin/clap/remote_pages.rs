@@ -56,14 +56,17 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
             page.add_param(&techniques.tract_interval);
             page.add_param(&expression.slap);
         });
-        section.add_page("Room and players", |page| {
+        section.add_page("Room", |page| {
             page.add_param(&room.amount);
             page.add_param(&room.size);
             page.add_param(&room.decay);
             page.add_param(&room.tone);
+        });
+        section.add_page("Players", |page| {
             page.add_param(&players.count);
             page.add_param(&players.split);
             page.add_param(&players.spread);
+            page.add_param(&players.onset_spread);
             page.add_param(&players.seats);
         });
         section.add_page("Tuning", |page| {

@@ -161,7 +161,7 @@ fn angles(score: &Score, feels: &InstrumentFeel, table: &FeelTable, rate: u32) -
         }
         while let Some(event) = score.events.get(next).filter(|event| event.at <= at) {
             match event.event {
-                Event::NoteOn { note, .. } => keys.press(note),
+                Event::NoteOn { note, .. } => _ = keys.press(note),
                 Event::NoteOff { note } => keys.release(note),
                 Event::Breath(unit) => breath = f64::from(unit),
                 _ => {}

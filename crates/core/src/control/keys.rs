@@ -34,15 +34,17 @@ impl Keys {
         self.count == 0
     }
 
-    /// A key goes down; again, if it was held.
-    pub fn press(&mut self, note: SoundingNote) {
+    /// A key goes down; again, if it was held. Returns the key that it pushes out, if one is.
+    pub fn press(&mut self, note: SoundingNote) -> Option<SoundingNote> {
         self.release(note);
-        if self.count == MOST {
+        let pushed_out = (self.count == MOST).then_some(self.held[0]);
+        if pushed_out.is_some() {
             self.held.copy_within(1.., 0);
             self.count -= 1;
         }
         self.held[self.count] = note;
         self.count += 1;
+        pushed_out
     }
 
     /// A key comes up.
@@ -79,7 +81,7 @@ mod tests {
     fn more_keys_than_fingers_push_the_oldest_out() {
         let mut keys = Keys::default();
         for key in 0..40 {
-            keys.press(SoundingNote(key));
+            assert_eq!(keys.press(SoundingNote(key)), key.checked_sub(MOST as u8).map(SoundingNote));
         }
         assert_eq!(keys.last(), Some(SoundingNote(39)));
         for key in (25..40).rev() {

@@ -448,7 +448,10 @@ impl MidiDecoder {
     /// A key goes down for the player.
     fn finger(&mut self, key: u8) {
         let note = SoundingNote(key);
-        self.fingers.press(note);
+        // The player may not play all keys, so that it would push another one out, or none.
+        if let Some(note) = self.fingers.press(note) {
+            self.said.push(Event::NoteOff { note });
+        }
         self.said.push(Event::NoteOn { note, velocity: self.velocity });
     }
 

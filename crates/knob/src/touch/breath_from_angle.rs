@@ -79,7 +79,7 @@ impl Blower {
     pub fn heed(&mut self, event: &Timed<Event>) {
         match event.event {
             Event::NoteOn { note, .. } if self.notes.of(note).is_none() => return,
-            Event::NoteOn { note, .. } => self.keys.press(note),
+            Event::NoteOn { note, .. } => _ = self.keys.press(note),
             Event::NoteOff { note } | Event::Choke { note } => self.keys.release(note),
             Event::Panic => self.keys = Keys::default(),
             _ => return,
