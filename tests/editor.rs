@@ -104,6 +104,22 @@ impl Window {
         self.harness.run();
     }
 
+    /// Turns the wheel by so many notches, up if they are positive, with the pointer there.
+    fn wheel(&mut self, at: egui::Pos2, notches: f32) {
+        self.harness.hover_at(at);
+        self.harness.step();
+        self.harness.event(egui::Event::MouseWheel {
+            unit: egui::MouseWheelUnit::Line,
+            delta: egui::vec2(0.0, notches),
+            phase: egui::TouchPhase::Move,
+            source: egui::MouseWheelSource::Unknown,
+            modifiers: egui::Modifiers::NONE,
+        });
+        self.harness.step();
+        self.harness.remove_cursor();
+        self.harness.run_steps(15);
+    }
+
     /// Presses at a point, moves by `by` in two steps, lets go.
     fn drag(&mut self, from: egui::Pos2, by: egui::Vec2) {
         self.harness.hover_at(from);

@@ -1,10 +1,13 @@
 //! Keys that move a control which has the focus: arrows (Shift: ten times finer), Home and End, Delete for the default; and
-//! the steps that a screen reader asks for.
+//! the steps that a screen reader asks for. The wheel of a mouse over a control moves it as the arrow keys do.
 
 use egui::accesskit::Action as AccessAction;
-use egui::{EventFilter, Key, Response, Ui};
+use egui::{Event, EventFilter, Key, MouseWheelSource, MouseWheelUnit, Response, Ui};
 
 use crate::editor::controls::{Hands, Look};
+
+/// Scrolling by so many points, as touch pads tell it, is one notch of a wheel: what egui scrolls for one.
+const POINTS_A_NOTCH: f32 = 40.0;
 
 /// How the keys move a kind of control.
 pub struct KeySteps {
@@ -50,6 +53,41 @@ impl KeySteps {
             }
         });
         let value = to.or((by != 0.0).then(|| (look.value + by).clamp(0.0, 1.0)))?;
+        hands.put(id, value);
+        Some(value)
+    }
+
+    /// Moves a control as the wheel asks while the pointer is over it; its new value, if it moves.
+    pub fn wheeled(
+        &self,
+        ui: &Ui,
+        hands: &mut Hands,
+        id: &'static str,
+        look: &Look,
+        response: &Response,
+    ) -> Option<f32> {
+        if !response.hovered() {
+            return None;
+        }
+        let unit = look.steps.map_or(self.share, |steps| 1.0 / steps.max(1) as f32);
+        let by = ui.input(|input| {
+            let fine = if input.modifiers.shift && look.steps.is_none() { 0.1 } else { 1.0 };
+            let notches = input.events.iter().map(|event| match event {
+                // A flick that rolls on is not meant for what the pointer comes to meanwhile.
+                Event::MouseWheel { source: MouseWheelSource::Momentum, .. } => 0.0,
+                // With Shift, some systems turn the wheel sideways.
+                Event::MouseWheel { unit, delta, .. } if !input.modifiers.command => {
+                    let turned = if delta.y == 0.0 && input.modifiers.shift { delta.x } else { delta.y };
+                    match unit {
+                        MouseWheelUnit::Point => turned / POINTS_A_NOTCH,
+                        MouseWheelUnit::Line | MouseWheelUnit::Page => turned,
+                    }
+                }
+                _ => 0.0,
+            });
+            unit * fine * notches.sum::<f32>()
+        });
+        let value = (by != 0.0).then(|| (look.value + by).clamp(0.0, 1.0))?;
         hands.put(id, value);
         Some(value)
     }

@@ -195,6 +195,16 @@ fn every_main_control_drags_resets_and_takes_keys() {
         window.harness.key_press(Key::Delete);
         window.harness.run();
         assert_eq!(look(&window).value, look(&window).default, "{name} does not reset by keys");
+        window.drag(centre, vec2(0.0, way));
+        let before = look(&window).value;
+        let down = if way < 0.0 { -1.0 } else { 1.0 };
+        window.host.told();
+        window.wheel(centre, down);
+        assert!((look(&window).value - before) * way > 0.0, "{name} does not move by the wheel");
+        assert!(matches!(window.host.told()[..], [Told::Begin(_), Told::Set(..), Told::End(_)]));
+        window.wheel(vec2(4.0, 4.0).to_pos2(), down);
+        assert!(window.host.told().is_empty(), "{name} heeds the wheel elsewhere");
+        window.double_click(centre);
     }
 }
 

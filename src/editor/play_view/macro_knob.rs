@@ -1,5 +1,5 @@
-//! A main control as a round knob. It moves by dragging up and down (Shift: ten times finer) and by arrow keys when it has the
-//! focus. A double click or Ctrl-click sets the default. A click on its value, or Enter, opens a text field.
+//! A main control as a round knob. It moves by dragging up and down (Shift: ten times finer), by the wheel of a mouse, and by arrow keys
+//! when it has the focus. A double click or Ctrl-click sets the default. A click on its value, or Enter, opens a text field.
 
 use egui::{
     Align2, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
@@ -19,7 +19,7 @@ const TRAVEL: f32 = 160.0;
 const KEYS: KeySteps = KeySteps { share: 0.02, has_vertical: true };
 /// The arc, from its low end to its high end, radians clockwise from the right.
 const ARC: (f32, f32) = (0.75 * std::f32::consts::PI, 2.25 * std::f32::consts::PI);
-const HOW: &str = "Drag up or down, or press the arrow keys once Tab has brought you here; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
+const HOW: &str = "Drag up or down, turn the wheel of the mouse, or press the arrow keys once Tab has brought you here; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
 /// Size of the field for a typed value, points.
 const FIELD: Vec2 = vec2(84.0, 24.0);
 /// Between an arc and the edge of its place: the tick at the default, and a gap, points.
@@ -69,6 +69,9 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, grown: f32, 
     }
     if response.has_focus() && !is_typing {
         value = KEYS.moved(ui, hands, of.id, &look, &response).unwrap_or(value);
+    }
+    if !is_typing {
+        value = KEYS.wheeled(ui, hands, of.id, &look, &response).unwrap_or(value);
     }
     if response.double_clicked() || (response.clicked() && ui.input(|input| input.modifiers.command)) {
         value = look.default;
