@@ -104,7 +104,7 @@ const NEEDS: [Need; 14] = [
         ids: &["late"],
         is_met: |settings, _| settings.players.count > 1 && settings.players.split == Split::Unison,
         may_be_played: false,
-        why: "is for several players in unison; add --players and --set split=unison",
+        why: "is for several players in unison; add --unison",
     },
     Need {
         ids: &["spread", "seats"],

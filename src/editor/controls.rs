@@ -196,6 +196,17 @@ impl Hands<'_> {
         self.end(id);
     }
 
+    /// A notch of the wheel: one touch, and one step with the notches before it.
+    pub fn nudge(&mut self, id: &'static str, value: f32) {
+        let Some(look) = self.controls.look(id).filter(|_| !self.held.contains(&id)) else { return };
+        self.controls.begin(id);
+        self.controls.set(id, value.clamp(0.0, 1.0));
+        self.controls.end(id);
+        if terms::is_setting(id) {
+            self.history.nudge(id, look.value, self.controls.look(id).map_or(0.0, |look| look.value));
+        }
+    }
+
     /// Several at once, as one step.
     pub fn put_all(&mut self, values: &[(&'static str, f32)]) {
         values.iter().for_each(|&(id, _)| self.begin(id));

@@ -2,7 +2,7 @@
 //! the steps that a screen reader asks for. The wheel of a mouse over a control moves it as the arrow keys do.
 
 use egui::accesskit::Action as AccessAction;
-use egui::{Event, EventFilter, Key, MouseWheelSource, MouseWheelUnit, Response, Ui};
+use egui::{Event, EventFilter, Key, MouseWheelSource, MouseWheelUnit, Response, Ui, Vec2};
 
 use crate::editor::controls::{Hands, Look};
 
@@ -57,7 +57,7 @@ impl KeySteps {
         Some(value)
     }
 
-    /// Moves a control as the wheel asks while the pointer is over it; its new value, if it moves.
+    /// Moves a control without steps as the wheel asks while the pointer is over it; its new value, if it moves.
     pub fn wheeled(
         &self,
         ui: &Ui,
@@ -66,12 +66,14 @@ impl KeySteps {
         look: &Look,
         response: &Response,
     ) -> Option<f32> {
-        if !response.hovered() {
+        // While it is dragged a hand is on it.
+        if !response.hovered() || response.dragged() {
             return None;
         }
-        let unit = look.steps.map_or(self.share, |steps| 1.0 / steps.max(1) as f32);
-        let by = ui.input(|input| {
-            let fine = if input.modifiers.shift && look.steps.is_none() { 0.1 } else { 1.0 };
+        let by = ui.input_mut(|input| {
+            // What all of a small window lies in would scroll, too.
+            input.smooth_scroll_delta = Vec2::ZERO;
+            let fine = if input.modifiers.shift { 0.1 } else { 1.0 };
             let notches = input.events.iter().map(|event| match event {
                 // A flick that rolls on is not meant for what the pointer comes to meanwhile.
                 Event::MouseWheel { source: MouseWheelSource::Momentum, .. } => 0.0,
@@ -85,10 +87,10 @@ impl KeySteps {
                 }
                 _ => 0.0,
             });
-            unit * fine * notches.sum::<f32>()
+            self.share * fine * notches.sum::<f32>()
         });
         let value = (by != 0.0).then(|| (look.value + by).clamp(0.0, 1.0))?;
-        hands.put(id, value);
+        hands.nudge(id, value);
         Some(value)
     }
 }

@@ -144,6 +144,8 @@ pub struct UndoHistory {
     open: Vec<(&'static str, f32)>,
     /// Finished parts of a gesture of several parameters.
     parts: Vec<Change>,
+    /// The parameter that the wheel has moved in the last step.
+    nudged: Option<&'static str>,
 }
 
 impl UndoHistory {
@@ -168,6 +170,16 @@ impl UndoHistory {
             let changes = std::mem::take(&mut self.parts);
             self.record(Step { changes, ..Step::default() });
         }
+    }
+
+    /// The wheel moved a parameter by a notch: with the notches right before it, it is one step.
+    pub fn nudge(&mut self, id: &'static str, before: f32, after: f32) {
+        let last = self.done.last_mut().and_then(|step| step.changes.first_mut());
+        match last.filter(|_| self.nudged == Some(id)) {
+            Some(last) => last.after = after,
+            None => self.record(Step { changes: vec![Change { id, before, after }], ..Step::default() }),
+        }
+        self.nudged = Some(id);
     }
 
     /// A whole step at once.
@@ -200,6 +212,7 @@ impl UndoHistory {
     }
 
     fn push(&mut self, step: Step) {
+        self.nudged = None;
         self.done.push(step);
         if self.done.len() > KEPT {
             self.done.remove(0);
@@ -222,6 +235,7 @@ impl UndoHistory {
             return Restored::default();
         };
         let step = self.done.remove(at);
+        self.nudged = None;
         let values = step.changes.iter().rev().map(|change| (change.id, change.before)).collect();
         let preset = step.preset.as_ref().map(|[before, _]| before.clone());
         let alterations = step.moved.as_ref().map(|moved| moved.brought(now, &moved.before));
@@ -271,6 +285,23 @@ mod tests {
         assert_eq!(history.back().values, [("zeta", 0.1)]);
         assert_eq!(history.back().values, []);
         assert_eq!(history.again().values, [("zeta", 0.7)]);
+    }
+
+    #[test]
+    fn notches_of_the_wheel_are_one_step_until_something_else_is() {
+        let mut history = UndoHistory::default();
+        history.nudge("zeta", 0.1, 0.2);
+        history.nudge("zeta", 0.2, 0.3);
+        history.begin("zeta", 0.3);
+        history.end("zeta", 0.5);
+        history.nudge("zeta", 0.5, 0.6);
+        history.nudge("lay", 0.0, 0.1);
+        history.nudge("zeta", 0.6, 0.7);
+        assert_eq!(history.back().values, [("zeta", 0.6)]);
+        history.nudge("lay", 0.1, 0.2);
+        let back: Vec<_> =
+            std::iter::repeat_with(|| history.back().values).take_while(|v| !v.is_empty()).collect();
+        assert_eq!(back, [[("lay", 0.1)], [("lay", 0.0)], [("zeta", 0.5)], [("zeta", 0.3)], [("zeta", 0.1)]]);
     }
 
     #[test]

@@ -159,7 +159,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .flag("--breath-full"),
     entry("tongue", BREATH, "Tongue", number([1.0, 20.0], 2.0, 1, " ms"))
         .help(
-            "Time in which the tongue releases the reed",
+            "Time in which the tongue releases a reed that is blown",
             "A short time gives a crisp attack, a long time a soft one.",
             "",
         )

@@ -163,7 +163,11 @@ const MACROS: &[(&str, &str)] = &[
     ("Reed", "stren"),
     ("Tongue", "tongue"),
     ("Facing", "lay"),
+    ("Vibrato", "vib"),
+    ("Growl", "growl"),
+    ("Tract", "tract"),
     ("Noise", "noise"),
+    ("Room", "room"),
     ("Gain", "gain"),
 ];
 

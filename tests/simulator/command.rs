@@ -2,7 +2,7 @@
 
 use chalumeau_firmware::Setup;
 use chalumeau_knob::device::memory;
-use chalumeau_knob::device::serial::SerialTransport;
+use chalumeau_knob::device::serial::{OpenError, SerialTransport};
 use chalumeau_knob::device::transport::{Binding, Transport};
 use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
@@ -160,13 +160,24 @@ fn it_takes_one_end_of_a_pair_of_ports() {
     assert_eq!(missing.end(), Some(2));
 }
 
+/// Opens a port that another host has just closed. A program that starts at that moment may hold a copy of it until it runs.
+fn opened(path: &Path) -> SerialTransport {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        match SerialTransport::open(path) {
+            Err(OpenError::Busy(_)) if Instant::now() < end => std::thread::sleep(Duration::from_millis(10)),
+            other => return other.unwrap(),
+        }
+    }
+}
+
 #[test]
 fn host_after_host_is_answered_until_interrupted() {
     let mut knob = Running::start("--quiet --serial-number c1a2");
     let path = knob.port();
     assert!(fs::read_to_string(knob.card()).unwrap().contains(path.to_str().unwrap()));
     for session in 1..=3 {
-        let mut port = SerialTransport::open(&path).unwrap();
+        let mut port = opened(&path);
         let info = greet(&mut port, session);
         assert_eq!((info.serial, info.watchdog_ms), (0xC1A2, 80));
     }

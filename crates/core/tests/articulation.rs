@@ -373,6 +373,7 @@ fn a_key_that_hardly_goes_down_plays_a_short_note_and_no_click() {
 /// Above the break a note takes longer to speak than such a key is down.
 #[test]
 fn a_short_key_is_about_as_loud_as_a_long_one() {
+    let mut shorts = Vec::new();
     for note in (50..=90).map(SoundingNote) {
         for velocity in [0.25, 0.6, 0.9] {
             let loudest = |seconds: f64| {
@@ -384,10 +385,14 @@ fn a_short_key_is_about_as_loud_as_a_long_one() {
             let long = loudest(0.3);
             for ms in [1.0, 10.0, 30.0, 50.0] {
                 let short = loudest(1e-3 * ms) - long;
+                shorts.push(short.abs());
                 assert!(short.abs() < 9.0, "{note:?}, velocity {velocity}, {ms} ms: {short:.1} dB");
             }
         }
     }
+    shorts.sort_by(f64::total_cmp);
+    let [half, tenth] = [shorts[shorts.len() / 2], shorts[shorts.len() * 9 / 10]];
+    assert!(half < 1.5 && tenth < 3.0, "half within {half:.1} dB, nine tenths within {tenth:.1}");
 }
 
 /// The tongue lets go of a reed on which no pressure rests so slowly that the air column does not pop.
@@ -404,4 +409,24 @@ fn keys_without_breath_are_silent() {
     };
     let (blown, not_blown) = (gesture(0.5), gesture(0.0));
     assert!(not_blown < blown - 40.0, "{not_blown:.1} and {blown:.1} dB");
+}
+
+/// A key that has come up without breath plays nothing, whenever breath comes.
+#[test]
+fn breath_after_a_key_has_come_up_plays_nothing() {
+    for tongue_ms in [1.0, 2.0, 20.0] {
+        for blown_s in [0.02, 0.05, 0.1, 0.2, 1.0] {
+            let settings = Settings { tongue_ms, ..still(Articulation::default()) };
+            let events = [
+                (0.0, Event::Breath(0.5)),
+                (0.02, Event::Breath(0.0)),
+                on(0.3, 60),
+                off(0.31, 60),
+                (0.31 + blown_s, Event::Breath(0.7)),
+            ];
+            let sound = heard(&settings, &events, 0.31 + blown_s + 0.5);
+            let most = sound[sample(0.31)..].iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            assert!(most < 3e-3, "tongue {tongue_ms} ms, breath after {blown_s} s: {most}");
+        }
+    }
 }

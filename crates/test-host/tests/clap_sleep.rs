@@ -72,7 +72,7 @@ fn breath_that_blows_keeps_awake_and_breath_that_ends_does_not() {
 }
 
 #[test]
-fn panic_and_choked_slurs_are_asleep_soon() {
+fn slurs_that_a_controller_or_panic_ends_are_asleep_soon() {
     let mut plugin = plugin();
     let panic = plugin.param("Panic").unwrap().id;
     plugin

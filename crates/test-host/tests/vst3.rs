@@ -125,7 +125,7 @@ fn parameters_have_names_units_and_text() {
     let all = loaded.plugin.get_parameters().unwrap();
     // Behind them the framework hides one parameter for each MIDI controller of each channel.
     let ours: Vec<_> = all.iter().filter(|param| !param.name.starts_with("MIDI")).collect();
-    assert_eq!(ours.len(), 108, "{:?}", ours.iter().map(|param| &param.name).collect::<Vec<_>>());
+    assert_eq!(ours.len(), 109, "{:?}", ours.iter().map(|param| &param.name).collect::<Vec<_>>());
     for (name, text) in
         [("Full breath", "6.00"), ("A4", "440.0"), ("Reed coupled", "Coupled"), ("Tuning", "Tempered")]
     {

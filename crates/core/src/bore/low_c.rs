@@ -1,7 +1,7 @@
 //! A longer lower joint: four semitones more, down to written C3, as bass clarinets have it.
 //!
-//! Behind the lowest hole the bore narrows to the width that it has before its flare and goes on as a tube; then it widens again to the
-//! old end and bell. In this tube stand four pads, open at rest. The key of each low note closes its own pad and all above it.
+//! Behind the lowest hole the bore narrows to the width that it has before its flare and goes on as a tube; then it widens again,
+//! and the end of the old flare and the bell follow. In this tube stand four pads, open at rest. The key of each low note closes its own pad and all above it.
 //!
 //! A tube of the width that the bore has at that hole would be wider than the rest. It put the second and third mode of the lowest note 190
 //! and 202 cents below its harmonics, now 54 and 44: for 0.15 s, the note began up to 1.8 semitones flat.
@@ -11,14 +11,14 @@ use crate::units::WrittenNote;
 
 /// The lowest hole of the ordinary clarinet. Behind it the tube begins.
 const LOWEST_HOLE: &str = "E_PAD";
-/// Length from there to the old end, m, on a clarinet of twice the B flat clarinet's size; so are all lengths here.
+/// Length from there to the end of the old flare, m, on a clarinet of twice the B flat clarinet's size; so are all lengths here.
 ///
 /// It and the places of the holes follow from the transfer-matrix model at 25 C: written E3 has its resonance 9 cents above equal
 /// temperament, as before, and each note below it 10 cents, as `chalumeau instrument check` says. Not a measured instrument.
 const TUBE_M: f64 = 0.296_96;
 /// Radius of the tube, m: that of the bore before its flare.
 const TUBE_RADIUS_M: f64 = 0.0146;
-/// Where it narrows behind the lowest hole, from and to, m, clear of that hole, and how far before its end it widens again, m (by judgement).
+/// Where it narrows, from and to, m behind the middle of the lowest hole, and how far before its end it widens again, m (by judgement).
 const NARROWS_M: (f64, f64) = (0.010, 0.030);
 /// See [`NARROWS_M`].
 const WIDENS_M: f64 = 0.060;

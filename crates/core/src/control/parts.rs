@@ -21,7 +21,7 @@ use crate::control::midi::breath::BreathFrom;
 use crate::control::midi::links::{Link, Links, MOST as MOST_LINKS, Source};
 use crate::control::midi::snapshot;
 use crate::control::midi::techniques::Wheel;
-use crate::control::midi::{BREATH_LIKE, BreathOrigin, MidiDecoder};
+use crate::control::midi::{BREATH_LIKE, BreathOrigin, ENDS_ALL, MidiDecoder};
 use crate::control::notes::{HeldNote, MOST as MOST_NOTES, Note, NoteAddress, NoteExpression};
 use crate::event::{Event, PartEvent, To};
 
@@ -280,6 +280,9 @@ impl Parts {
     /// See [`MidiDecoder::controller`].
     pub fn controller(&mut self, channel: u8, cc: u8, value: u8) -> &[PartEvent] {
         let (channel, cc, value) = (channel % 16, cc.min(127), value.min(127));
+        if ENDS_ALL.contains(&cc) {
+            self.switches.release_all();
+        }
         let is_of_finger = BREATH_LIKE.contains(&cc) || self.links().has(Source::Controller(cc));
         if is_of_finger && self.is_of_switch(channel) {
             self.begin();

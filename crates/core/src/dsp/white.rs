@@ -26,6 +26,13 @@ impl White {
         self.0 = next(self.0);
         UNIT * (self.0 as i64) as f64
     }
+
+    /// The next number, uniform in 0..1. Real-time safe.
+    pub fn unit(&mut self) -> f64 {
+        self.0 = next(self.0);
+        // All that a double has room for.
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
 }
 
 #[cfg(test)]
@@ -40,5 +47,8 @@ mod tests {
         assert!(mean(&|n| all[n]).abs() < 0.01);
         assert!((mean(&|n| all[n] * all[n]) - 1.0).abs() < 0.01);
         assert!(mean(&|n| all[n] * all[n - 1]).abs() < 0.01);
+        let units: Vec<f64> = (0..100_000).map(|_| white.unit()).collect();
+        assert!(units.iter().all(|unit| (0.0..1.0).contains(unit)));
+        assert!((units.iter().sum::<f64>() / 1e5 - 0.5).abs() < 0.005);
     }
 }

@@ -106,12 +106,17 @@ impl Seat {
         }
     }
 
-    /// Takes an event now, or up to so many samples later if it belongs to a note.
+    /// Takes an event now, or up to so many samples later if it is a note or comes with one: a bend that overtook its note would bend
+    /// the note before.
     fn apply_late(&mut self, event: Event, most: f64) {
         let now = match event {
-            Event::NoteOn { .. } | Event::NoteOff { .. } | Event::TongueSlap { .. } => {
-                self.lateness.take(event, most)
-            }
+            Event::NoteOn { .. }
+            | Event::NoteOff { .. }
+            | Event::TongueSlap { .. }
+            | Event::Bend { .. }
+            | Event::Fingerings(_)
+            | Event::TryHoles(_)
+            | Event::Hole { .. } => self.lateness.take(event, most),
             Event::Panic => {
                 self.lateness.forget();
                 Some(event)
@@ -542,7 +547,8 @@ impl Ensemble {
 
     /// Whether players who can be heard finger different notes.
     pub fn plays_chord(&self) -> bool {
-        let heard = self.seats.iter().filter(|seat| !seat.is_silent());
+        // Those who are late finger the note before.
+        let heard = self.seats.iter().filter(|seat| !seat.is_silent() && self.players.split == Split::Chords);
         let mut notes = heard.map(|seat| seat.clarinet.player_state().fingering);
         notes.next().is_some_and(|first| notes.any(|note| note != first))
     }

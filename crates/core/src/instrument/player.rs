@@ -340,7 +340,8 @@ impl Player {
             None => {
                 let may_fall = !self.tongue.is_holding() && !self.tongue.is_slapping();
                 if !(may_fall && self.inflection.fall(&self.settings.articulation, self.breath.gamma())) {
-                    self.tongue.stop();
+                    // Without breath there is nothing to play first.
+                    if self.breath.is_at_rest() { self.tongue.land() } else { self.tongue.stop() }
                 }
             }
         }
@@ -498,12 +499,8 @@ impl Player {
 
     /// The same, whether the player breathes in or not.
     fn is_idle(&self) -> bool {
-        !self.tongue.is_slapping() && self.breath.is_resting(self.holds_note())
-    }
-
-    /// Whether a note is to sound: a key is down, or the note of the last one falls or has yet to speak.
-    fn holds_note(&self) -> bool {
-        !self.keys.is_empty() || self.inflection.is_falling() || self.tongue.is_due()
+        !self.tongue.is_slapping()
+            && self.breath.is_resting(holds_note(&self.keys, &self.inflection, &self.tongue))
     }
 
     /// The breath that comes in during this tick, Pa at 1 m, if any.
@@ -564,18 +561,21 @@ impl Player {
             };
             Posture::new(settings, &fingered, tick_s, model)
         });
-        if std::mem::take(&mut self.has_other_reed)
-            && is_idle
-            && let Some(force) = self.tongue.rest_on(posture.free_closing)
-        {
-            voice.hold_reed(force);
+        if self.has_other_reed {
+            // A tongue on its way to the reed takes the other one when it is there.
+            let force = self.tongue.rest_on(posture.free_closing).filter(|_| is_idle);
+            self.has_other_reed = is_idle && force.is_none();
+            if let Some(force) = force {
+                voice.hold_reed(force);
+            }
         }
         let (articulation, gamma) = (&settings.articulation, self.breath.gamma());
         self.inhalation.tick(articulation.breath_in, is_idle, gamma, tick_s);
-        if self.inflection.tick(self.tongue.is_holding(), gamma, articulation, tick_s) {
-            self.tongue.stop();
+        let has_fallen = self.inflection.tick(self.tongue.is_holding(), gamma, articulation, tick_s);
+        if has_fallen || (self.tongue.is_due() && self.breath.is_at_rest()) {
+            self.tongue.land();
         }
-        let key_down = !self.keys.is_empty() || self.inflection.is_falling() || self.tongue.is_due();
+        let key_down = holds_note(&self.keys, &self.inflection, &self.tongue);
         let tongue_holds = self.tongue.is_holding();
         let asked = self.breath.asked(key_down);
         self.ear.hear(voice.p_mouthpiece() / posture.closing, posture.lags.ear);
@@ -631,4 +631,9 @@ impl Player {
         }
         drive
     }
+}
+
+/// Whether a note is to sound: a key is down, or the note of the last one falls or has yet to speak.
+fn holds_note(keys: &Keys, inflection: &Inflection, tongue: &Tongue) -> bool {
+    !keys.is_empty() || inflection.is_falling() || tongue.is_due()
 }

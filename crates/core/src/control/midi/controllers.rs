@@ -28,6 +28,9 @@ const ALL_NOTES_OFF: u8 = 123;
 /// Controllers that breath can come from.
 pub const BREATH_LIKE: [u8; 4] = [BREATH, BREATH_FINE, EXPRESSION, EXPRESSION_FINE];
 
+/// Controllers that end all notes.
+pub const ENDS_ALL: [u8; 2] = [ALL_SOUND_OFF, ALL_NOTES_OFF];
+
 /// From this value on the pedal is down.
 const PEDAL_DOWN: u8 = 64;
 
@@ -77,7 +80,7 @@ impl MidiDecoder {
             EXPRESSION_FINE => self.hear(BreathController::Expression, at, Part::Fine(value), place, false),
             // A host that stops behind a snapshot means it.
             ALL_SOUND_OFF => self.cut_all(),
-            // So are notes that a pedal holds: a host that stops leaves none. The pedal itself stays where it is.
+            // Notes that the pedal holds end, too: a host that stops leaves none. The pedal itself stays where it is.
             ALL_NOTES_OFF => self.lift_all(),
             _ if matches!(place, Place::Recognised | Place::Within) => {}
             _ => self.control(at, cc, value),

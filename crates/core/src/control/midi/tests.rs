@@ -324,6 +324,17 @@ fn all_notes_off_ends_keys_and_what_the_pedal_holds_on_any_channel_and_cuts_noth
     assert_eq!(midi.controller(9, 123, 0), [off(67)]);
 }
 
+/// A player does not take keys that its instrument lacks, so that its list of held keys is not full when the decoder's is.
+#[test]
+fn a_key_that_the_seventeenth_pushes_out_comes_up_for_the_player() {
+    let mut midi = MidiDecoder::new();
+    for note in 40..56 {
+        assert!(!midi.note_on(0, note, 127).iter().any(|event| matches!(event, Event::NoteOff { .. })));
+    }
+    assert_eq!(midi.note_on(0, 56, 127), [off(40), on(56)]);
+    assert_eq!(midi.note_off(0, 40), NOTHING);
+}
+
 /// A member's full wheel, and a manager's.
 const FULL: [f32; 2] = [4_800.0, 200.0];
 

@@ -311,6 +311,19 @@ fn the_finger_on_a_key_switch_does_not_blow() {
 }
 
 #[test]
+fn what_ends_all_notes_lifts_key_switches_too() {
+    for cc in [120, 123] {
+        let mut parts = Parts::of(MidiDecoder::new().with_mpe(), 2);
+        parts.set_key_switches(KeySwitches::C2);
+        parts.note_on(1, 60, 127);
+        parts.note_on(2, 37, 127);
+        assert_eq!(parts.pressure(2, 20), []);
+        parts.controller(0, cc, 0);
+        assert!(!parts.switches.is_down_on(2));
+    }
+}
+
+#[test]
 fn a_key_that_is_down_is_no_switch_any_more_where_the_row_has_moved() {
     let mut parts = Parts::of(MidiDecoder::new().with_mpe(), 1);
     parts.set_key_switches(KeySwitches::C2);

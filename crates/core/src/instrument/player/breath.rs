@@ -107,9 +107,14 @@ impl Breath {
         if self.live { 0.5 + self.velocity } else { 1.0 }
     }
 
+    /// Whether a breath source sets the breath, and rests.
+    pub fn is_at_rest(&self) -> bool {
+        self.live && self.level == 0.0
+    }
+
     /// Whether the pressure has gone and none is asked for.
     pub fn is_resting(&self, key_down: bool) -> bool {
-        self.gamma < NO_BREATH && (!key_down || (self.live && self.level == 0.0))
+        self.gamma < NO_BREATH && (!key_down || self.is_at_rest())
     }
 
     /// The same velocity and breath level for another instrument, whose pressure begins at 0.

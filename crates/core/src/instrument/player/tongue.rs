@@ -83,7 +83,7 @@ impl Tongue {
         (self.away_s, self.is_due) = (0.0, false);
     }
 
-    /// Stops the note; one that has hardly begun is played first, as short as may be. Until it lands it [is due](Self::is_due).
+    /// Stops the note; one that has hardly begun is played until it speaks, for [`LATEST_S`] at most. Until then it [is due](Self::is_due).
     pub fn stop(&mut self) {
         match self.position {
             // On the reed, where it stays.
@@ -92,6 +92,18 @@ impl Tongue {
             _ if self.away_s < LATEST_S => self.is_due = true,
             _ => self.position = Position::Stopping(0.0),
         }
+    }
+
+    /// Lands at once, whatever has been heard of the note.
+    pub fn land(&mut self) {
+        self.is_due = false;
+        self.position = match self.position {
+            Position::Leaving(left) => Position::Stopping(left),
+            Position::Away => Position::Stopping(0.0),
+            Position::Stopping(reached) => Position::Stopping(reached),
+            // On the reed, where it stays.
+            _ => Position::Resting,
+        };
     }
 
     /// Begins a slap of a strength in 0..=1; false if there is nothing to begin. `closing` is the closing pressure of
