@@ -47,7 +47,7 @@ def instrument(what: InstrumentLike) -> Instrument:
     >>> import chalumeau
     >>> bass = chalumeau.instrument("bass")
     >>> bass.name, round(bass.length_m, 3)
-    ('B flat bass clarinet to low C, Boehm system', 1.732)
+    ('B flat bass clarinet to low C, Boehm system', 1.632)
     >>> chalumeau.instrument(bass.to_toml()) == bass
     True
     """

@@ -31,7 +31,7 @@ pub struct Players {
     /// How far out of tune they are, cents either way, 0..=25; the first one is in tune. Default 6 (by judgement).
     pub spread_cents: f32,
     /// In unison, how much later than the first one the others begin their notes at most, ms, 0..=60; each note differs. Default
-    /// 25 (by judgement; see [`ensemble`](super::ensemble)).
+    /// 25 (by judgement; `ensemble/lateness.rs`).
     pub onset_spread_ms: f32,
     /// How wide they sit, 0 (all in the middle)..=1 (from side to side). Default 0.7 (by judgement).
     pub width: f32,

@@ -75,6 +75,11 @@ impl Default for Tongue {
     }
 }
 
+/// Share of its speed with which the tongue moves at this mouth pressure over the closing pressure.
+fn speed(gamma: f64) -> f64 {
+    (gamma / QUIET_GAMMA).clamp(LEAST_SPEED, 1.0)
+}
+
 impl Tongue {
     /// Prepares a tongued note, which begins in time with what rings if the note before does.
     pub fn hold(&mut self, is_in_time: bool) {
@@ -184,7 +189,7 @@ impl Tongue {
             self.force = if force <= self.force {
                 force
             } else {
-                self.force + step_towards(tick_s, PRESS_S) * (force - self.force)
+                self.force + step_towards(tick_s, PRESS_S / speed(gamma)) * (force - self.force)
             };
             return (p_mouth, self.force);
         };
@@ -212,7 +217,7 @@ impl Tongue {
         context: &TickContext<'_>,
     ) -> f64 {
         let tick_s = context.tick_s;
-        let speed = (gamma / QUIET_GAMMA).clamp(LEAST_SPEED, 1.0);
+        let speed = speed(gamma);
         let (position, share) = match self.position {
             Position::Resting => (Position::Resting, 1.0),
             Position::Away => {
