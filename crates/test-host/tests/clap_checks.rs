@@ -120,7 +120,9 @@ fn play_with(
             peak = peak.max(sample.abs());
         }
     }
-    assert!(peak > 1e-3, "something sounds at {rate_hz} Hz: {peak}");
+    // A microphone at rest blows nothing: only the tongue is heard.
+    let least = if heard.is_some() { 1e-5 } else { 1e-3 };
+    assert!(peak > least, "something sounds at {rate_hz} Hz: {peak}");
     instance.deactivate(processor.stop_processing());
 }
 
