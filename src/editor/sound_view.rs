@@ -212,9 +212,11 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         ui.label(egui::RichText::new(alone).font(theme::small()).color(c.quiet));
     }
     choice(ui, hands, "split");
-    for id in ["spread", "late", "seats"] {
-        slider(ui, hands, id);
+    slider(ui, hands, "spread");
+    if hands.step("split") == 1 {
+        slider(ui, hands, "late");
     }
+    slider(ui, hands, "seats");
 }
 
 /// Power of the odd over that of the even harmonics, dB.

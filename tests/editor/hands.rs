@@ -26,7 +26,7 @@ const SLIDERS: &[(Tab, &[&str])] = &[
         Tab::Sound,
         &[
             "a4", "noise", "zeta", "lay", "vent", "gain", "room", "rsize", "rdecay", "rtone", "player",
-            "spread", "late", "seats",
+            "spread", "seats",
         ],
     ),
     (
@@ -39,6 +39,8 @@ const SLIDERS: &[(Tab, &[&str])] = &[
 const MAKER_SLIDERS: &[&str] = &["rstiff", "rarea", "rwidth", "ropen"];
 /// While the instrument is heard from a position.
 const LISTENING_SLIDERS: &[&str] = &["ldist", "langle", "lheigh", "lwidth"];
+/// While several players play in unison.
+const UNISON_SLIDERS: &[&str] = &["late"];
 /// On the last page of the knob's panel.
 const STUDY_SLIDERS: &[&str] = &["part", "seed", "trial"];
 const SWITCHES: &[(Tab, &[&str])] =
@@ -80,7 +82,7 @@ fn every_parameter_has_a_place() {
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())
-        .chain([MAKER_SLIDERS, LISTENING_SLIDERS].into_iter().flatten())
+        .chain([MAKER_SLIDERS, LISTENING_SLIDERS, UNISON_SLIDERS].into_iter().flatten())
         .chain(MOMENTARY.iter().map(|(_, id, _)| id))
         .chain(OTHERWISE.iter().map(|(id, _)| id))
         .copied()
@@ -252,6 +254,9 @@ fn every_slider_drags_types_and_resets() {
     window.host.automate("heard", 0.5);
     window.harness.run();
     LISTENING_SLIDERS.iter().for_each(|id| drags_types_and_resets(&mut window, id));
+    window.host.automate("split", 1.0);
+    window.harness.run();
+    UNISON_SLIDERS.iter().for_each(|id| drags_types_and_resets(&mut window, id));
 }
 
 fn study() -> Window {

@@ -1,7 +1,8 @@
 //! A longer lower joint: four semitones more, down to written C3, as bass clarinets have it.
 //!
 //! Behind the lowest hole the bore narrows to the width that it has before its flare and goes on as a tube; then it widens again,
-//! and the end of the old flare and the bell follow. In this tube stand four pads, open at rest. The key of each low note closes its own pad and all above it.
+//! and the end of the old flare and the bell follow. In this tube stand four pads, open at rest. The key of each low note closes its own pad
+//! and all above it.
 //!
 //! A tube of the width that the bore has at that hole would be wider than the rest. It put the second and third mode of the lowest note 190
 //! and 202 cents below its harmonics, now 54 and 44: for 0.15 s, the note began up to 1.8 semitones flat.
@@ -135,6 +136,28 @@ mod tests {
             assert!((off - wanted_cents).abs() < 1.0, "{written}: {off}");
         }
         assert_eq!((file.lowest(), file.lowest_unextended()), (WrittenNote(48), WrittenNote(52)));
+    }
+
+    /// Cents between the second and third mode of a note and the third and fifth harmonic of the first.
+    fn inharmonicity(file: &InstrumentFile, written: u8) -> [f64; 2] {
+        let matrix = TransferMatrix::new(file, Air::default());
+        let open = &file.fingering(WrittenNote(written)).unwrap().open;
+        let first_hz = file.sounding(WrittenNote(written)).frequency_hz(440.0);
+        let near = |times: f64| {
+            let found = matrix.playing_frequency(open, file.reed_volume_m3, times * first_hz);
+            found.unwrap().0
+        };
+        let first_hz = near(1.0);
+        [3.0, 5.0].map(|times| cents(near(times), times * first_hz))
+    }
+
+    #[test]
+    fn the_modes_of_the_lowest_notes_lie_near_their_harmonics() {
+        let file = Bundled::Bass.file();
+        for written in 48..=52 {
+            let off = inharmonicity(&file, written);
+            assert!(off.iter().all(|off| (-80.0..20.0).contains(off)), "{written}: {off:.0?}");
+        }
     }
 
     #[test]

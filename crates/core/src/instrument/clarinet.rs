@@ -104,7 +104,7 @@ pub(super) struct Progress {
 
 impl Clarinet {
     /// Longest time from rest to silence, s: what a host must still play when breath and keys have ended. The bass clarinet
-    /// takes 1.74 s (`tests/silence.rs`).
+    /// takes 1.56 s (`tests/silence.rs`).
     pub const TAIL_S: f64 = 2.0;
 
     /// The built-in B flat clarinet at a host rate in Hz, 1000..=1536000. Allocates.

@@ -547,8 +547,11 @@ impl Ensemble {
 
     /// Whether players who can be heard finger different notes.
     pub fn plays_chord(&self) -> bool {
-        // Those who are late finger the note before.
-        let heard = self.seats.iter().filter(|seat| !seat.is_silent() && self.players.split == Split::Chords);
+        // In unison, those who are late finger the note before.
+        if self.players.split == Split::Unison {
+            return false;
+        }
+        let heard = self.seats.iter().filter(|seat| !seat.is_silent());
         let mut notes = heard.map(|seat| seat.clarinet.player_state().fingering);
         notes.next().is_some_and(|first| notes.any(|note| note != first))
     }

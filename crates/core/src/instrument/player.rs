@@ -563,7 +563,7 @@ impl Player {
         });
         if self.has_other_reed {
             // A tongue on its way to the reed takes the other one when it is there.
-            let force = self.tongue.rest_on(posture.free_closing).filter(|_| is_idle);
+            let force = if is_idle { self.tongue.rest_on(posture.free_closing) } else { None };
             self.has_other_reed = is_idle && force.is_none();
             if let Some(force) = force {
                 voice.hold_reed(force);
@@ -616,8 +616,8 @@ impl Player {
         let shaken = self.techniques.shake(gamma, note_hz * self.tuning.speed(), settings, tick_s);
         let hardness =
             self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
-        let (p_mouth, tongue) =
-            self.tongue.tick(shaken, hardness, &self.ear, || self.response.hears(&self.ear), &context);
+        let speaks = self.tongue.is_due() && self.response.hears(&self.ear);
+        let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, (&self.ear, speaks), &context);
         let beside_cents = self.slide.as_ref().map_or(0.0, Slide::beside_cents);
         let added_cents = (sway.cents, self.inflection.cents() + beside_cents);
         let has_other_speed = self.tuning.tick(fingering, gamma, added_cents, &context, model, lattice);

@@ -4,7 +4,8 @@ use super::links;
 use crate::control::notes;
 use crate::event::Event;
 
-/// Bend, breath, volume, pan, vibrato, three techniques, a new key and the one that it pushes out, a choke, a release of every held key, and every link.
+/// Bend, breath, volume, pan, vibrato, three techniques, a new key and the one that it pushes out, a choke, a release of every held key, and
+/// every link.
 const MOST: usize = notes::MOST + 13 + links::MOST;
 
 /// The events of the latest message.

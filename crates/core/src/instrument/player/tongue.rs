@@ -56,6 +56,8 @@ pub struct Tongue {
     is_in_time: bool,
     /// The key has come up: it lands as soon as it may.
     is_due: bool,
+    /// Its last movement was a slap.
+    has_slapped: bool,
     /// The slap that pulls at the reed, if there is one; it overrides the position.
     slap: Option<Slap>,
     /// Force on the reed, smoothed so that the tongue never slaps by accident; negative while a slap pulls.
@@ -69,6 +71,7 @@ impl Default for Tongue {
             away_s: LATEST_S,
             is_in_time: false,
             is_due: false,
+            has_slapped: false,
             slap: None,
             force: TONGUE_FORCE,
         }
@@ -85,7 +88,7 @@ impl Tongue {
     pub fn hold(&mut self, is_in_time: bool) {
         self.is_in_time = is_in_time;
         self.position = Position::Holding(HOLD_S);
-        (self.away_s, self.is_due) = (0.0, false);
+        (self.away_s, self.is_due, self.has_slapped) = (0.0, false, false);
     }
 
     /// Stops the note; one that has hardly begun is played until it speaks, for [`LATEST_S`] at most. Until then it [is due](Self::is_due).
@@ -116,7 +119,7 @@ impl Tongue {
     pub fn slap(&mut self, strength: f32, closing: f64, key_down: bool, gamma: f64) -> bool {
         let Some(slap) = Slap::begin(strength, self.force / closing, self.slap) else { return false };
         self.slap = Some(slap);
-        (self.away_s, self.is_due) = (LATEST_S, false);
+        (self.away_s, self.is_due, self.has_slapped) = (LATEST_S, false, true);
         self.position = match key_down {
             false => Position::Resting,
             true if gamma < BREATH_GAMMA => Position::AwaitingBreath,
@@ -168,28 +171,28 @@ impl Tongue {
     }
 
     /// Moves the tongue. `gamma` is the mouth pressure over the closing pressure, `hardness` the factor of
-    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness), `ear` hears what rings, and `speaks` whether the note is as loud
-    /// as it should be. Gives the pressure at the reed's tip and
-    /// the force on the reed, both over the reference closing pressure.
+    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness), `heard` is the ear, which hears what rings, and
+    /// whether a note that [is due](Self::is_due) is as loud as it should be. Gives the pressure at the reed's tip and the force on the reed, both
+    /// over the reference closing pressure.
     pub fn tick(
         &mut self,
         gamma: f64,
         hardness: f64,
-        ear: &Ear,
-        speaks: impl FnOnce() -> bool,
+        heard: (&Ear, bool),
         context: &TickContext<'_>,
     ) -> (f64, f64) {
         let (tick_s, closing) = (context.tick_s, context.posture.closing);
         let free_closing = context.posture.free_closing;
-        let share = self.move_on(gamma, hardness, ear, speaks, context);
+        let share = self.move_on(gamma, hardness, heard, context);
         let p_mouth = gamma * closing;
         let force = TONGUE_FORCE * free_closing * share;
         let Some(slap) = &mut self.slap else {
-            // Letting go is as quick as asked; pressing takes a moment.
+            // Letting go is as quick as asked; pressing takes a moment. After a slap it shuts the reed, with breath or without.
+            let press_s = if self.has_slapped { PRESS_S } else { PRESS_S / speed(gamma) };
             self.force = if force <= self.force {
                 force
             } else {
-                self.force + step_towards(tick_s, PRESS_S / speed(gamma)) * (force - self.force)
+                self.force + step_towards(tick_s, press_s) * (force - self.force)
             };
             return (p_mouth, self.force);
         };
@@ -212,8 +215,7 @@ impl Tongue {
         &mut self,
         gamma: f64,
         hardness: f64,
-        ear: &Ear,
-        speaks: impl FnOnce() -> bool,
+        (ear, speaks): (&Ear, bool),
         context: &TickContext<'_>,
     ) -> f64 {
         let tick_s = context.tick_s;
@@ -222,7 +224,7 @@ impl Tongue {
             Position::Resting => (Position::Resting, 1.0),
             Position::Away => {
                 self.away_s = (self.away_s + tick_s).min(LATEST_S);
-                let lands = self.is_due && self.away_s >= SHORTEST_S && (self.away_s == LATEST_S || speaks());
+                let lands = self.is_due && self.away_s >= SHORTEST_S && (speaks || self.away_s == LATEST_S);
                 self.is_due &= !lands;
                 (if lands { Position::Stopping(0.0) } else { Position::Away }, 0.0)
             }
