@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use chalumeau_core::bore::lattice::{HoleFlows, Lattice, Tip};
 use chalumeau_core::event::Event;
-use chalumeau_core::instrument::held_note::HeldNote;
+use chalumeau_core::instrument::trial_note::TrialNote;
 use chalumeau_core::instrument::voice::{Drive, TICK};
 use chalumeau_core::instrument::{Clarinet, Model};
 use chalumeau_core::reed::{ReedState, ReedTables};
@@ -17,9 +17,9 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 const HOST_HZ: f64 = 48_000.0;
 const GAMMA: f64 = 0.5;
 
-fn held(model: &Model) -> HeldNote {
+fn held(model: &Model) -> TrialNote {
     let written = model.file.fingerings.iter().position(|fingering| fingering.written == WrittenNote(60));
-    HeldNote::new(model, written.expect("the built-in clarinet has a C4"), GAMMA)
+    TrialNote::new(model, written.expect("the built-in clarinet has a C4"), GAMMA)
 }
 
 fn reed(criterion: &mut Criterion) {

@@ -14,7 +14,7 @@ use crate::output::{self, OutputError};
 
 /// Environment variable that names a directory to use instead of the system's own; for tests and unusual systems.
 pub const VARIABLE: &str = "CHALUMEAU_CACHE_DIR";
-/// Number of entries kept; the least recently used are removed first. An entry is about 10 kB.
+/// Number of entries kept; the least recently used are removed first. An entry is some 25 kB.
 pub const ENTRIES_MOST: usize = 64;
 /// File name extension of entries.
 const SUFFIX: &str = "prepared";

@@ -17,7 +17,7 @@ use chalumeau_core::haptics::{
     TorqueLimits,
 };
 use chalumeau_core::instrument::feel_inputs::{played_reed, requirements};
-use chalumeau_core::instrument::held_note::HeldNote;
+use chalumeau_core::instrument::trial_note::TrialNote;
 use chalumeau_core::instrument::voice::{Drive, TICK, Voice};
 use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::reed::physical::P_REF_PA;
@@ -270,7 +270,7 @@ fn growth(fingering: usize, settings: &Settings, gamma: f64, f_hz: f64) -> f64 {
         rate,
     );
     // Without jets: half a second after the breath began, the rest of the steady flow in the holes would still damp.
-    let held = HeldNote { jet_loss: 0.0, ..HeldNote::new(&MODEL, fingering, gamma) };
+    let held = TrialNote { jet_loss: 0.0, ..TrialNote::new(&MODEL, fingering, gamma) };
     let mut voice: Voice<f64> = held.voice(&MODEL);
     let closing = played.law.closing();
     let tick = |voice: &mut Voice<f64>, gamma: f64| {
@@ -347,7 +347,7 @@ fn linear_stability_of_the_moving_reed_is_the_instruments_own() {
 fn heard_onset(fingering: usize, expected: f64) -> f64 {
     /// Rms over the closing pressure: ten times that of the breath noise in the mouthpiece before the note.
     const SOUND: f64 = 0.005;
-    let held = HeldNote::new(&MODEL, fingering, 0.0);
+    let held = TrialNote::new(&MODEL, fingering, 0.0);
     let (reed, rate) = (held.reed(&MODEL), MODEL.coeffs.rate_hz);
     let mut voice: Voice<f32> = held.voice(&MODEL);
     voice.set_probing(true);
@@ -436,7 +436,7 @@ fn every_note_starts_itself() {
 
 /// Gamma above which a loud note is silent, in a slow crescendo.
 fn heard_extinction(fingering: usize, zeta: f64, expected: f64) -> f64 {
-    let held = HeldNote { zeta, ..HeldNote::new(&MODEL, fingering, 0.0) };
+    let held = TrialNote { zeta, ..TrialNote::new(&MODEL, fingering, 0.0) };
     let (reed, rate) = (held.reed(&MODEL), MODEL.coeffs.rate_hz);
     let mut voice: Voice<f32> = held.voice(&MODEL);
     voice.set_probing(true);

@@ -19,8 +19,8 @@ use chalumeau_core::analysis::to_f64;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::event::Event;
-use chalumeau_core::instrument::held_note::{HeldNote, Start, TONGUE_HOLD_S};
 use chalumeau_core::instrument::prepare::{Preparation, Progress, auto_tune};
+use chalumeau_core::instrument::trial_note::{Start, TONGUE_HOLD_S, TrialNote};
 use chalumeau_core::instrument::voice::{Drive, TICK};
 use chalumeau_core::instrument::{Clarinet, Model, Quality, Settings, Tuning, Wanted};
 use chalumeau_core::units::{REFERENCE_RADIUS_M, WrittenNote, cents};
@@ -208,7 +208,7 @@ fn tuned_instruments_are_in_tune_as_hosts_hear_them() {
 fn tempered_cents(model: &Model, note: usize, gamma: f64) -> f64 {
     let rows = model.tuning.rows(note, Tuning::Tempered, gamma);
     let from_s = slower(model) * if gamma < 0.5 { 1.0 } else { 0.6 };
-    let held = HeldNote { rows, ..HeldNote::new(model, note, gamma) };
+    let held = TrialNote { rows, ..TrialNote::new(model, note, gamma) };
     let sound = held.radiated(model, from_s, from_s + 0.3 * slower(model));
     off_cents(model, note, pitch::fundamental_hz(&sound, model.coeffs.rate_hz))
 }
@@ -317,7 +317,7 @@ fn every_instrument_has_a_players_dynamics() {
 }
 
 /// Mouthpiece pressure of a held note, sample by sample, for two seconds.
-fn mouthpiece(model: &Model, note: &HeldNote) -> Vec<f64> {
+fn mouthpiece(model: &Model, note: &TrialNote) -> Vec<f64> {
     let mut voice = note.voice::<f32>(model);
     voice.set_probing(true);
     let (rate_hz, reed) = (model.coeffs.rate_hz, note.reed(model));
@@ -343,8 +343,8 @@ fn tongued_notes_of_every_size_speak_at_once() {
     for (name_of_case, model) in &charted {
         let rate_hz = model.coeffs.rate_hz;
         for (name, note, limit_ms) in [("C4", 60, 45.0), ("E3", 52, 60.0)] {
-            let held = HeldNote::new(model, fingering(model, note), 0.5);
-            let pressure = mouthpiece(model, &HeldNote { start: Start::Tongued(2.0), ..held });
+            let held = TrialNote::new(model, fingering(model, note), 0.5);
+            let pressure = mouthpiece(model, &TrialNote { start: Start::Tongued(2.0), ..held });
             let t90_ms = 1e3 * onset::t90_s(&pressure, rate_hz, TONGUE_HOLD_S).unwrap();
             let limit_ms = limit_ms * size(model);
             println!("{name_of_case}, {name}: t90 {t90_ms:.1} ms from the tongue, at most {limit_ms:.1}");
@@ -397,7 +397,7 @@ fn old_pitch_and_high_pitch_are_a_longer_and_a_shorter_bore() {
         assert!((model.scale * a4_hz / 440.0 - 1.0).abs() < 0.01, "{}", model.scale);
         let notes: Vec<usize> = up_to(model, G6).collect();
         let off = each(&notes, |&note| {
-            let held = HeldNote::new(model, note, 0.5);
+            let held = TrialNote::new(model, note, 0.5);
             off_cents(model, note, auto_tune::heard_hz(model, &held, model.notes_hz[note]))
         });
         assert_in_tune(&format!("B flat at A4 = {a4_hz} Hz, scale {:.4}", model.scale), model, &notes, &off);
@@ -431,7 +431,7 @@ fn bundled_instruments_hold_their_registers() {
         let promised = up_to(&model, G_SHARP_6).count();
         for gamma in [0.5, 0.8] {
             let right = each(&notes, |&note| {
-                auto_tune::heard_hz(&model, &HeldNote::new(&model, note, gamma), model.notes_hz[note])
+                auto_tune::heard_hz(&model, &TrialNote::new(&model, note, gamma), model.notes_hz[note])
                     .is_some()
             });
             let held = right.iter().filter(|&&right| right).count();

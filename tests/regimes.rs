@@ -14,8 +14,8 @@ use std::sync::LazyLock;
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::bore::transfer_matrix::threshold_gamma;
 use chalumeau_core::instrument::Model;
-use chalumeau_core::instrument::held_note::HeldNote;
-use chalumeau_core::instrument::held_note::Start;
+use chalumeau_core::instrument::trial_note::Start;
+use chalumeau_core::instrument::trial_note::TrialNote;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_core::units::cents;
 use memoryless::MemorylessVoice;
@@ -109,7 +109,7 @@ fn harmonics_grow_as_powers_of_the_first_near_threshold() {
 }
 
 /// Share of the time that a steady held note spends at or beyond the extrapolated closing, and fully shut.
-fn closed_shares(note: &HeldNote) -> (f64, f64) {
+fn closed_shares(note: &TrialNote) -> (f64, f64) {
     let (mut all, mut beating, mut shut) = (0.0, 0.0, 0.0);
     let mut ticks = 0;
     note.play(&MODEL, 1.5, |_, voice| {
@@ -134,7 +134,7 @@ fn reed_beats_from_mezzoforte_on() {
         .flat_map(|(lay, note)| gammas.map(|gamma| (lay, note, gamma)))
         .collect();
     let found = each(&runs, |&(lay, note, gamma)| {
-        closed_shares(&HeldNote { lay, ..HeldNote::new(&MODEL, fingering(note), gamma) })
+        closed_shares(&TrialNote { lay, ..TrialNote::new(&MODEL, fingering(note), gamma) })
     });
     for (&(lay, note, gamma), &(beating, shut)) in runs.iter().zip(&found) {
         println!("lay {lay} written {note} gamma {gamma:.2}: beating {beating:.3} shut {shut:.3}");
@@ -193,13 +193,13 @@ fn too_much_breath_shuts_the_reed_until_it_is_much_less() {
 }
 
 /// Fundamental of a held note, if there is a periodic one. Listens from 0.55 to 0.8 s.
-fn heard_hz(note: &HeldNote) -> Option<f64> {
+fn heard_hz(note: &TrialNote) -> Option<f64> {
     let sound = note.radiated(&MODEL, 0.55, 0.8);
     let hz = pitch::fundamental_hz(&sound, MODEL.coeffs.rate_hz)?;
     (pitch::periodicity(&sound, MODEL.coeffs.rate_hz, hz) > 0.9).then_some(hz)
 }
 
-fn in_register(note: &HeldNote) -> bool {
+fn in_register(note: &TrialNote) -> bool {
     heard_hz(note).is_some_and(|hz| cents(hz, MODEL.notes_hz[note.fingering]).abs() < 150.0)
 }
 
@@ -210,7 +210,7 @@ fn every_note_up_to_g_sharp_6_holds_its_register() {
         for gamma in [0.45, 0.5, 0.6, 0.8, 0.9] {
             for zeta in [0.25, 0.3, 0.4] {
                 for start in [Start::Ramp(20.0), Start::Tongued(2.0)] {
-                    runs.push(HeldNote { zeta, start, ..HeldNote::new(&MODEL, fingering(note), gamma) });
+                    runs.push(TrialNote { zeta, start, ..TrialNote::new(&MODEL, fingering(note), gamma) });
                 }
             }
         }
@@ -239,9 +239,9 @@ fn every_note_up_to_g_sharp_6_holds_its_register() {
 /// C#7 has no fingering with a resonance in the right place.
 #[test]
 fn above_g_sharp_6_all_but_c_sharp_7_hold_their_register() {
-    let runs: Vec<HeldNote> = (93..=97)
+    let runs: Vec<TrialNote> = (93..=97)
         .flat_map(|note| {
-            [0.45, 0.5, 0.6, 0.8, 0.9].map(|gamma| HeldNote::new(&MODEL, fingering(note), gamma))
+            [0.45, 0.5, 0.6, 0.8, 0.9].map(|gamma| TrialNote::new(&MODEL, fingering(note), gamma))
         })
         .collect();
     let right = each(&runs, in_register);
@@ -255,12 +255,13 @@ fn above_g_sharp_6_all_but_c_sharp_7_hold_their_register() {
 fn without_vent_loss_fewer_clarion_and_altissimo_notes_hold() {
     let notes: Vec<u8> = (71..=92).collect();
     for gamma in [0.5, 0.6] {
-        let runs: Vec<HeldNote> = [2.0, 0.0]
+        let runs: Vec<TrialNote> = [2.0, 0.0]
             .into_iter()
             .flat_map(|jet_loss| {
-                notes
-                    .iter()
-                    .map(move |&note| HeldNote { jet_loss, ..HeldNote::new(&MODEL, fingering(note), gamma) })
+                notes.iter().map(move |&note| TrialNote {
+                    jet_loss,
+                    ..TrialNote::new(&MODEL, fingering(note), gamma)
+                })
             })
             .collect();
         let right = each(&runs, in_register);
@@ -282,7 +283,7 @@ fn without_vent_loss_fewer_clarion_and_altissimo_notes_hold() {
 /// A fundamental above this that is not the wanted note is a squeak, Hz.
 const SQUEAK_HZ: f64 = 1_050.0;
 
-fn squeaks(note: &HeldNote) -> bool {
+fn squeaks(note: &TrialNote) -> bool {
     let wanted = MODEL.notes_hz[note.fingering];
     heard_hz(note).is_some_and(|hz| hz > SQUEAK_HZ && cents(hz, wanted).abs() > 150.0)
 }
@@ -294,7 +295,7 @@ fn nothing_squeaks_under_a_proper_lip() {
         for step in 0..=10 {
             for zeta in [0.2, 0.3, 0.4] {
                 let gamma = 0.4 + 0.05 * f64::from(step);
-                runs.push(HeldNote { zeta, ..HeldNote::new(&MODEL, fingering(note), gamma) });
+                runs.push(TrialNote { zeta, ..TrialNote::new(&MODEL, fingering(note), gamma) });
             }
         }
     }
@@ -312,12 +313,12 @@ fn nothing_squeaks_under_a_proper_lip() {
 
 #[test]
 fn a_reed_without_lip_damping_squeaks() {
-    let runs: Vec<HeldNote> = (60..=84)
-        .flat_map(|note| [0.45, 0.6, 0.8].map(|gamma| HeldNote::new(&MODEL, fingering(note), gamma)))
+    let runs: Vec<TrialNote> = (60..=84)
+        .flat_map(|note| [0.45, 0.6, 0.8].map(|gamma| TrialNote::new(&MODEL, fingering(note), gamma)))
         .map(|note| {
             let rule =
                 chalumeau_core::instrument::lip::embouchure(MODEL.notes_hz[note.fingering], MODEL.size_hz);
-            HeldNote { damping: 0.3 / rule.damping, ..note }
+            TrialNote { damping: 0.3 / rule.damping, ..note }
         })
         .collect();
     let heard = each(&runs, squeaks);

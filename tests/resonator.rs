@@ -13,8 +13,8 @@ use chalumeau_core::bore::cells::networks;
 use chalumeau_core::bore::lattice::{HoleFlows, Lattice, LatticeCoeffs, Real, Tip};
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, find_peaks, threshold_gamma};
 use chalumeau_core::instrument::Model;
-use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
+use chalumeau_core::instrument::trial_note::TrialNote;
 use chalumeau_core::instrument::voice::{Drive, TICK, Voice};
 use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::reed::{ReedCoeffs, ReedLoad, ReedState, ReedTables};
@@ -470,7 +470,7 @@ impl<F: Real> Tip<F> for Blown<'_, F> {
     }
 }
 
-fn blown<'a, F: Real>(model: &Model, note: &HeldNote, reed: &'a ReedCoeffs, samples: usize) -> Blown<'a, F> {
+fn blown<'a, F: Real>(model: &Model, note: &TrialNote, reed: &'a ReedCoeffs, samples: usize) -> Blown<'a, F> {
     let mut lattice = fingered::<F>(model, &openings(model, note.fingering));
     lattice.set_jet_loss(note.jet_loss);
     lattice.glide_delay(note.rows, 0);
@@ -491,7 +491,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 #[test]
 fn reed_plays_the_same_on_the_independent_lattice() {
     for (model, written) in [(&models()[0], 60), (&models()[0], 79), (&models()[1], 79)] {
-        let note = HeldNote::new(model, index_of(model, written), 0.5);
+        let note = TrialNote::new(model, index_of(model, written), 0.5);
         let reed = note.reed(model);
         let samples = model.coeffs.rate_hz as usize;
         let opening = openings(model, note.fingering);
@@ -543,7 +543,7 @@ fn reed_plays_the_same_on_the_independent_lattice() {
 /// Bits of a second of music: noise, vent loss, fingers and delay moving.
 fn bits<F: Real>(plain: bool) -> Vec<u64> {
     let model = &models()[0];
-    let first = HeldNote { noise: 0.5, ..HeldNote::new(model, index_of(model, 79), 0.6) };
+    let first = TrialNote { noise: 0.5, ..TrialNote::new(model, index_of(model, 79), 0.6) };
     let mut voice: Voice<F> = first.voice(model);
     if plain {
         voice = voice.without_avx2();
@@ -716,7 +716,7 @@ fn cutoff_below_the_first_open_hole_is_that_of_the_reference() {
 #[test]
 fn held_note_leaves_no_subnormal_behind() {
     let model = &models()[0];
-    let note = HeldNote::new(model, 0, 0.5);
+    let note = TrialNote::new(model, 0, 0.5);
     let reed = note.reed(model);
     for flushed in [true, false] {
         let mut lattice = fingered::<f32>(model, &openings(model, 0));
@@ -792,7 +792,7 @@ fn mouthpiece_pressure_decays_with_the_q_of_the_bore() {
             let row = reference.iter().find(first).unwrap();
             let f_hz = number(row, "f_hz");
             let expected_s = number(row, "Q") / (std::f64::consts::PI * f_hz);
-            let note = HeldNote { zeta: 0.0, ..HeldNote::new(model, fingering, 0.5) };
+            let note = TrialNote { zeta: 0.0, ..TrialNote::new(model, fingering, 0.5) };
             let (coeffs, mut state) = (note.reed(model), ReedState::default());
             let load = coeffs.before(1.0 / model.coeffs.tip_admittance());
             let behind_reed = decay_s(model, fingering, f_hz, |p_minus| {

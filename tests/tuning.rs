@@ -13,9 +13,9 @@ use chalumeau_core::instrument::Clarinet;
 use chalumeau_core::instrument::Model;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::Tuning;
-use chalumeau_core::instrument::held_note::HeldNote;
-use chalumeau_core::instrument::held_note::Start;
-use chalumeau_core::instrument::held_note::TONGUE_HOLD_S;
+use chalumeau_core::instrument::trial_note::Start;
+use chalumeau_core::instrument::trial_note::TONGUE_HOLD_S;
+use chalumeau_core::instrument::trial_note::TrialNote;
 use chalumeau_core::instrument::voice::Drive;
 use chalumeau_core::instrument::voice::TICK;
 use chalumeau_core::units::WrittenNote;
@@ -98,7 +98,7 @@ fn tempered_notes_stay_in_tune_from_piano_to_forte() {
         // Just above the threshold notes grow slowly.
         let from_s = if gamma < 0.5 { 0.9 } else { 0.6 };
         let sound =
-            HeldNote { rows, ..HeldNote::new(&model, note, gamma) }.radiated(&model, from_s, from_s + 0.3);
+            TrialNote { rows, ..TrialNote::new(&model, note, gamma) }.radiated(&model, from_s, from_s + 0.3);
         pitch::fundamental_hz(&sound, model.coeffs.rate_hz)
             .map_or(f64::NAN, |hz| cents(hz, model.notes_hz[note]))
     });
@@ -166,7 +166,7 @@ fn reference_pitch_bend_and_temperature_move_notes_by_what_they_say() {
 }
 
 /// Mouthpiece pressure of a held note, sample by sample.
-fn mouthpiece(model: &Model, note: &HeldNote, seconds: f64) -> Vec<f64> {
+fn mouthpiece(model: &Model, note: &TrialNote, seconds: f64) -> Vec<f64> {
     let mut voice = note.voice::<f32>(model);
     voice.set_probing(true);
     let (rate, reed) = (model.coeffs.rate_hz, note.reed(model));
@@ -185,8 +185,10 @@ fn tongued_notes_speak_at_once() {
     let rate = model.coeffs.rate_hz;
     let notes: Vec<u8> = (52..=84).collect();
     let t90_ms = each(&notes, |&written| {
-        let note =
-            HeldNote { start: Start::Tongued(2.0), ..HeldNote::new(&model, fingering(&model, written), 0.5) };
+        let note = TrialNote {
+            start: Start::Tongued(2.0),
+            ..TrialNote::new(&model, fingering(&model, written), 0.5)
+        };
         1e3 * onset::t90_s(&mouthpiece(&model, &note, 1.0), rate, TONGUE_HOLD_S).unwrap()
     });
     // From the key, that is with the tongue's hold and the breath's rise.

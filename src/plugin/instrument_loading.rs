@@ -6,8 +6,8 @@
 //!   finds none, it builds a rough one so that something sounds, then fits and tunes it, and hands over each better one.
 //! - The *audio* thread receives a complete instrument through a ring. The new instrument first plays unheard beside the
 //!   old one, then the two crossfade, and the old one goes back through another ring. The audio thread allocates and frees
-//!   nothing. It waits for nobody, with one exception: an offline render waits for the instrument that its parameters ask
-//!   for, so that two renders are the same.
+//!   nothing. It waits for nobody but in an offline render, which waits for the instrument and the preset that its parameters
+//!   ask for, so that two renders are the same.
 
 pub mod instrument_loader;
 pub mod instrument_request;
@@ -63,8 +63,7 @@ struct Activation {
     asked_before: u64,
 }
 
-/// What the threads share about the instrument. Only the main thread, the loader, the knob controller and the snapshot
-/// thread take the lock.
+/// What the threads share about the instrument. The audio thread never takes the lock.
 #[derive(Debug, Default)]
 pub struct SharedInstrument {
     activation: Mutex<Activation>,

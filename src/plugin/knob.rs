@@ -56,11 +56,11 @@ pub struct SharedKnob {
     breath: AtomicU32,
     /// Factors that controllers put on H and k, the bits of f32s.
     reed_factors: [AtomicU32; 2],
-    /// The feel in force. Only the controller and the link lock it.
+    /// The feel in force. The slow work and the link lock it.
     feel: Mutex<Option<Arc<FeelInForce>>>,
     /// What the angles blow: the feel in force or, where no motor makes torque, the one that the parameters describe.
     blown: Mutex<Option<Arc<FeelInForce>>>,
-    /// A test feel, which replaces the feel of any note. Only the window, the controller and the link lock it.
+    /// A test feel, which replaces the feel of any note. The window and the link lock it.
     test: Mutex<Option<message::Feel>>,
     /// The user has chosen a device, so that even the same choice counts as new.
     device_chosen: AtomicBool,
@@ -68,9 +68,9 @@ pub struct SharedKnob {
     audio_heart: OnceLock<Heartbeat>,
     /// The sign of life of the host's main thread.
     main_pulse: Arc<MainPulse>,
-    /// The state of the link. Only the controller and the window lock it.
+    /// The state of the link. The controller, the slow work and the window lock it.
     status: Mutex<Option<LinkStatus>>,
-    /// What the slow work tells the user. Only it and the controller lock it.
+    /// What the slow work tells the user. It and the controller lock it.
     work_texts: Mutex<WorkTexts>,
     /// A take is recorded, so the audio thread sends its sound.
     is_recording: AtomicBool,

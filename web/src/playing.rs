@@ -10,6 +10,7 @@ use chalumeau_core::control::midi::breath::{BreathController, BreathFrom};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::control::wind::{WindCoeffs, WindDesign, WindMeter};
+use chalumeau_core::dsp::smooth::smooth_single;
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::instrument::stereo::Stereo;
 use chalumeau_core::instrument::{BuildError, Channels, Ensemble, Preparation, Settings, Wanted};
@@ -112,8 +113,7 @@ impl Takeover {
                 return;
             }
             // Flat at both ends, and near nothing in the first 5 ms.
-            let way = self.played as f32 / self.fade as f32;
-            let gain = (way * way * (3.0 - 2.0 * way)).powi(2);
+            let gain = smooth_single(self.played as f32 / self.fade as f32).powi(2);
             for (sample, rest) in [left, right].into_iter().zip(&mut self.rest) {
                 *rest *= self.share;
                 *sample = gain * *sample + *rest;

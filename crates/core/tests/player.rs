@@ -109,6 +109,18 @@ fn medians(wanders: &[Wander]) -> [f64; 6] {
     ]
 }
 
+/// The lip is worked out anew at each of these events, and must be where it was.
+#[test]
+fn bends_that_change_nothing_leave_every_sample() {
+    for (controller_value, written) in [(30, 53), (80, 60), (127, 60), (127, 72), (100, 88)] {
+        let begin = [controller(controller_value), key(0.0, written)];
+        let bends = (10..60).map(|n| (0.01 * f64::from(n), Event::Bend { cents: 0.0 }));
+        let plain = rendered(&Settings::default(), &begin, 0.7);
+        let bent = rendered(&Settings::default(), &begin.into_iter().chain(bends).collect::<Vec<_>>(), 0.7);
+        assert!(plain == bent, "CC {controller_value}, written {written}");
+    }
+}
+
 #[test]
 fn held_notes_wander_as_recorded_ones_and_stand_still_without_life() {
     let lives = medians(&wanders(&Settings::default(), &[20, 45, 70, 95, 120]));

@@ -119,6 +119,18 @@ fn a_doubt_lets_the_knob_go_within_a_message_and_for_good() {
 }
 
 #[test]
+fn a_knob_that_jumps_again_and_again_is_disarmed_for_good_and_says_why() {
+    let leaps = *all().iter().find(|kind| kind.name.starts_with("leaps")).unwrap();
+    let mut course = Course::new(leaps);
+    course.run(4_000);
+    let alarm = course.session.alarm().unwrap();
+    assert!(alarm.contains("has jumped 4 times") && alarm.contains("connected again"), "{alarm}");
+    course.session.arm(100, false, 4_000_000);
+    course.run(500);
+    assert!(!course.knob.is_armed());
+}
+
+#[test]
 fn a_knob_of_version_1_0_is_asked_for_50_mnm_at_most() {
     let older = *all().iter().find(|kind| kind.name == "TTLink 1.0").unwrap();
     let mut course = Course::new(older);

@@ -104,9 +104,10 @@ impl InstrumentSwap {
         self.next.as_ref().map_or(&self.playing, |next| &next.ensemble)
     }
 
-    /// Whether neither the instrument nor its room sounds: the host may stop calling.
+    /// Whether neither the instrument nor its room sounds, and no other instrument is on its way: the host may stop calling. If it stopped
+    /// in the middle of an exchange, the next note would begin on the old instrument.
     pub fn is_silent(&self) -> bool {
-        self.playing.is_silent() && self.stereo.room().is_silent()
+        self.next.is_none() && self.playing.is_silent() && self.stereo.room().is_silent()
     }
 
     /// Longest time from rest to silence, s.
@@ -146,7 +147,7 @@ impl InstrumentSwap {
 
     /// Waits until the loader has done all that the parameters ask for: in the first block of an activation, because a
     /// host may send it parameters that come after the activation, and when `choice`, the value of *Instrument*, changes.
-    /// Only for an offline render: this is the one place where the audio thread waits.
+    /// Only for an offline render, which waits here and for presets, and nowhere else.
     pub fn wait_for(&mut self, choice: u32) {
         if self.awaited_choice.replace(choice) == Some(choice) {
             return;
@@ -384,6 +385,27 @@ mod tests {
         let off = Timed { at: 0, event: Event::NoteOff { note: SoundingNote(60) }.into() };
         ends.swap.render_events([off], Channels::one(&mut out));
         assert!(rms(&out[AT / 2..]) < 1e-3 * loud, "{} of {loud}", rms(&out[AT / 2..]));
+    }
+
+    #[test]
+    fn a_host_goes_on_calling_until_an_exchange_has_ended() {
+        let mut ends = swap_ends();
+        let mut out = vec![0.0; AT];
+        ends.swap.render_events(held(), Channels::one(&mut out));
+        let off = Timed { at: 0, event: Event::NoteOff { note: SoundingNote(60) }.into() };
+        ends.swap.render_events([off], Channels::one(&mut out[..2_400]));
+        // The note fades while the other instrument comes.
+        let ensemble = Box::new(Ensemble::built_in(RATE).unwrap());
+        assert!(ends.send.push(SwapCandidate { activation: 1, ensemble }).is_ok());
+        ends.swap.receive();
+        for _ in 0..100 {
+            ends.swap.render_events([], Channels::one(&mut out[..480]));
+            assert!(!ends.swap.is_silent() || ends.back.pop().is_ok());
+            if ends.swap.is_silent() {
+                return;
+            }
+        }
+        panic!("it never falls silent");
     }
 
     #[test]

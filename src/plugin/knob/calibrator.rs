@@ -104,7 +104,7 @@ impl Calibrator {
         if let (Taken::Rest { .. }, Some(link), Some(status)) = (taken, link, felt) {
             // The torque law counts its angles from the knob's own zero.
             link.zero();
-            (design.zero_deg, design.full_deg) = (0.0, design.full_deg - design.zero_deg);
+            design = design.from_zero();
             let (measured, zeros) = (SavedCalibration::of(&design), status.zeros);
             let until_s = self.began.elapsed().as_secs_f64() + SHOWN_WITHIN_S;
             self.awaited = Some(Awaited { measured, text, zeros, until_s });

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use super::SharedKnob;
 use chalumeau_knob::touch::heard::{Heard, HeardTrack};
 
-/// Samples under way: 0.3 s at 192 kHz. The controller takes them every 10 ms.
+/// Samples under way: 0.3 s at 192 kHz. The slow work takes them every 10 ms.
 const SAMPLES: usize = 65_536;
 /// Blocks under way: as many as fit if each has 64 samples.
 const BLOCKS: usize = SAMPLES / 64;
@@ -27,7 +27,7 @@ pub struct SoundSender {
     blocks: rtrb::Producer<Block>,
 }
 
-/// The controller's end.
+/// The slow work's end.
 pub struct SoundListener {
     sound: rtrb::Consumer<f32>,
     blocks: rtrb::Consumer<Block>,

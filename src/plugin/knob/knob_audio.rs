@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use super::feel_design::{feel_design, knob_design};
 use super::feels_cache::FeelsCache;
 use super::heard_sound::SoundSender;
-use super::slow_work::{from_zero, recorded_feel};
+use super::slow_work::recorded_feel;
 use super::take_recorder::load_take;
 use super::{NO_NOTE, SharedKnob};
 use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
@@ -44,8 +44,8 @@ pub struct KnobAudio {
     sound: SoundSender,
     /// Samples of a take that have been played.
     replayed: u64,
-    /// A replay that was loaded before playing began. Until the first replay ends, it takes precedence over what the controller
-    /// has loaded since.
+    /// A replay that was loaded before playing began. Until the first replay ends, it takes precedence over what the slow
+    /// work has loaded since.
     prepared: Option<PreparedReplay>,
     /// The last block replayed a take.
     replays: bool,
@@ -111,17 +111,17 @@ impl KnobAudio {
             return;
         }
         let Ok(path) = params.knob.take.read().map(|path| path.clone()) else { return };
-        // If the take or the feel fails to load, nothing is replayed; the controller reports why.
+        // If the take or the feel fails to load, nothing is replayed; the slow work reports why.
         let Ok(take) = load_take(&path) else { return };
         let Some(feels) = FeelsCache::default().of(instrument) else { return };
         let design = recorded_feel(&take).unwrap_or_else(|| feel_design(&params.knob));
         let Ok(table) = feels.table(&params.settings(), &design, &NO_MOTOR) else { return };
         let maps = feels.maps_for(&table, &params.settings());
-        let hand = take.mapping(maps, from_zero(knob_design(&params.knob)));
+        let hand = take.mapping(maps, knob_design(&params.knob).from_zero());
         self.prepared = Some(PreparedReplay { hand, take });
     }
 
-    /// Tells the controller which factors the reed's MIDI controllers put on H and k.
+    /// Tells the slow work which factors the reed's MIDI controllers put on H and k.
     pub fn set_reed_factors(&self, factors: [f32; 2]) {
         for (place, factor) in self.shared.reed_factors.iter().zip(factors) {
             place.store(factor.to_bits(), Ordering::Relaxed);

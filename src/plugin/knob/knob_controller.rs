@@ -82,10 +82,6 @@ impl KnobController {
                 self.cycle();
             } else {
                 KnobSwitches::without_knob(&self.params.moments);
-                if let Some((_, heart)) = &self.link {
-                    heart.beat();
-                }
-                self.angles.1.try_iter().for_each(drop);
             }
             std::thread::sleep(super::CYCLE);
         }

@@ -21,7 +21,6 @@ use chalumeau_core::haptics::{FeelDesign, TorqueLimits};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::LinkStatus;
-use chalumeau_knob::touch::angle::KnobDesign;
 use chalumeau_knob::touch::breath_from_angle::BreathMapping;
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR, PitchMaps};
 use chalumeau_knob::touch::take::{Take, TakeEmbouchure, TakeHand, TakeHead, TakeRow};
@@ -191,11 +190,11 @@ impl SlowWork {
         // A knob that feels counts from its own zero. The rest of another, which counts from where it was switched on, is none of
         // its own.
         let is_felt = status.is_some_and(|status| status.tier > 0);
-        TakeHand { design: if is_felt { from_zero(design) } else { design }, feels }
+        TakeHand { design: if is_felt { design.from_zero() } else { design }, feels }
     }
 
     fn update_hand(&mut self, status: Option<&LinkStatus>, has_changed: bool) {
-        let usual = from_zero(knob_design(&self.params.knob));
+        let usual = knob_design(&self.params.knob).from_zero();
         let TakeHand { design, feels } = match &self.replayed {
             Some(take) => take.hand(usual),
             None => self.hand_of(status),
@@ -287,11 +286,6 @@ fn makes_torque(status: &LinkStatus) -> bool {
     status.info.is_some() || status.armed
 }
 
-/// The same way to full breath, from zero.
-pub(super) fn from_zero(design: KnobDesign) -> KnobDesign {
-    KnobDesign { zero_deg: 0.0, full_deg: design.full_deg - design.zero_deg, ..design }
-}
-
 /// A warning if full breath does not reach the closing pressure.
 fn short_breath(settings: &Settings) -> Option<String> {
     let (full_kpa, closing_kpa) = (f64::from(settings.breath_full_kpa), 1e-3 * settings.closing_pa());
@@ -304,6 +298,7 @@ fn short_breath(settings: &Settings) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chalumeau_knob::touch::angle::KnobDesign;
     use chalumeau_knob::touch::breath_from_angle::Blower;
 
     #[test]
@@ -316,7 +311,7 @@ mod tests {
             Blower::default().blow(&hand, 200.0, 6_000.0).unwrap()
         };
         let own = KnobDesign { zero_deg: 0.0, full_deg: 360.0, ..KnobDesign::default() };
-        assert_eq!(breath(from_zero(design)), breath(own));
+        assert_eq!(breath(design.from_zero()), breath(own));
         assert_ne!(breath(design), breath(own));
     }
 }

@@ -6,12 +6,12 @@ use std::ops::ControlFlow;
 use anyhow::{Context, Result, bail, ensure};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::cells::Cells;
-use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
 use chalumeau_core::instrument::player::dynamics::NODES;
 use chalumeau_core::instrument::prepare::auto_tune::{self, Accuracy};
 use chalumeau_core::instrument::prepare::play_dynamics;
 use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument, Progress};
+use chalumeau_core::instrument::trial_note::TrialNote;
 use chalumeau_core::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA};
 use chalumeau_core::instrument::{Model, Quality, Wanted};
 use chalumeau_core::parallel;
@@ -295,7 +295,7 @@ fn check_tuning(name: &str, model: &Model, every: usize, highest: u8) -> Result<
         let trims = GAMMA_NODES.into_iter().zip(note.tempered).chain([(NATURAL_GAMMA, note.natural)]);
         let mut worst = (0.0_f64, String::new());
         for (gamma, rows) in trims {
-            let held = HeldNote { rows, ..HeldNote::new(model, fingering, gamma) };
+            let held = TrialNote { rows, ..TrialNote::new(model, fingering, gamma) };
             let hz = auto_tune::heard_hz(model, &held, model.notes_hz[fingering])?;
             let off = cents(hz, model.notes_hz[fingering]);
             if off.abs() > worst.0.abs() {

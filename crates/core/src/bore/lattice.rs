@@ -64,6 +64,8 @@ pub const MAX_TICKS: u32 = ROWS.1 - 8;
 /// Most tone holes and most changes of section together: lanes of seven groups of eight, of which holes and steps fill
 /// whole ones each.
 pub const MAX_CHUNKS: usize = 7;
+/// Strength K of the jet's loss in open holes with sharp edges (Dalmont, Nederveen et al. 2002), at which the bundled instruments are tuned.
+pub const JET_LOSS_REFERENCE: f64 = 2.0;
 /// States below this are set to 0, so that no denormal number slows a held note.
 pub const TINY: f64 = 1e-18;
 
@@ -399,7 +401,7 @@ impl<F: Real> Lattice<F> {
         self.moved
     }
 
-    /// Strength of the jet's loss in all holes: K, 0 (linear) ..= 4; 2 is physical for sharp edges. Real-time safe.
+    /// Strength of the jet's loss in all holes: K, 0 (linear) ..= 4; [`JET_LOSS_REFERENCE`] is physical for sharp edges. Real-time safe.
     pub fn set_jet_loss(&mut self, k: f64) {
         for (&(chunk, lane), jet) in self.hole_lanes.iter().zip(&*self.jets) {
             self.holes[chunk].jet_open[lane] = F::of(k * jet);

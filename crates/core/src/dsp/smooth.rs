@@ -12,3 +12,10 @@ pub fn smooth(way: f64) -> f64 {
     let way = way.clamp(0.0, 1.0);
     way * way * (3.0 - 2.0 * way)
 }
+
+/// [`smooth`] in single precision.
+#[inline(always)]
+pub fn smooth_single(way: f32) -> f32 {
+    let way = way.clamp(0.0, 1.0);
+    way * way * (3.0 - 2.0 * way)
+}

@@ -25,8 +25,8 @@ use crate::haptics::played_reed::PlayedReed;
 use crate::units::{A4_OF_THEORY_HZ, Air, WrittenNote, cents};
 
 /// The grid of a note reaches from this share of the lowest note's frequency to the larger of two frequencies: this multiple
-/// of the lowest note and this multiple of the note. The lip puts the resonance of the reed there, above which nothing
-/// starts.
+/// of the [lowest note without an extension](InstrumentFile::lowest_unextended) and this multiple of the note. The lip puts the resonance
+/// of the reed there, above which nothing starts.
 const FROM_LOWEST: f64 = 0.5;
 const TO_LOWEST: f64 = 11.0;
 const TO_NOTE: f64 = 1.6;
@@ -112,13 +112,13 @@ impl RequirementSolver {
     pub(crate) fn of_checked(file: &InstrumentFile, air: Air, a4_hz: f64) -> Self {
         let matrix = TransferMatrix::new(file, air);
         let sounding_hz = |written: WrittenNote| file.sounding(written).frequency_hz(a4_hz);
-        let lowest_hz = sounding_hz(file.lowest());
+        let (lowest_hz, size_hz) = (sounding_hz(file.lowest()), sounding_hz(file.lowest_unextended()));
         let notes = file
             .fingerings
             .iter()
             .map(|fingering| {
                 let (open, note_hz) = (&fingering.open, sounding_hz(fingering.written));
-                let range = (FROM_LOWEST * lowest_hz, (TO_LOWEST * lowest_hz).max(TO_NOTE * note_hz));
+                let range = (FROM_LOWEST * lowest_hz, (TO_LOWEST * size_hz).max(TO_NOTE * note_hz));
                 let bore = AdmittanceGrid::new(range, |f_hz| matrix.impedance(f_hz, open, 0.0).inv());
                 let playing = matrix.playing_frequency(open, file.reed_volume_m3, note_hz);
                 let mode = playing
@@ -229,6 +229,9 @@ impl RequirementSolver {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bore::bundled::Bundled;
+    use crate::instrument::Settings;
+    use crate::instrument::feel_inputs::played_reed;
 
     #[test]
     fn what_is_no_pitch_or_no_instrument_is_refused() {
@@ -239,6 +242,19 @@ mod tests {
         }
         let silent = InstrumentFile { fingerings: Vec::new(), ..file };
         assert!(RequirementSolver::new(&silent, air, 440.0).unwrap_err().to_string().contains("fingering"));
+    }
+
+    #[test]
+    fn the_grid_of_every_note_reaches_beyond_the_resonance_of_its_reed() {
+        for bundled in Bundled::ALL {
+            let file = bundled.file();
+            let solver = RequirementSolver::of_checked(&file, Air::default(), 440.0);
+            let reed = played_reed(&file, 440.0, &Settings::default());
+            for (note, lip) in solver.notes.iter().zip(&reed.lips) {
+                let end_hz = note.bore.range_hz().1;
+                assert!(end_hz > lip.resonance_hz, "{bundled:?}, {}: {end_hz} Hz", note.written);
+            }
+        }
     }
 
     #[test]

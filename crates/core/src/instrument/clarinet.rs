@@ -25,15 +25,16 @@ use crate::instrument::stage::Chair;
 use crate::instrument::voice::{Probe, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
-use crate::reed::physical::ZETA_REFERENCE;
+use crate::reed::physical::{LAY_REFERENCE, ZETA_REFERENCE};
 use crate::reed::{MovingReed, ReedCoeffs};
 use crate::units::nearest_rate_hz;
 
 /// Samples up to this magnitude count as silence: -120 dBFS. A gain that raises them raises it as well: single precision may
 /// leave a bore ringing at -140 dBFS for ever.
 const SILENCE: f32 = 1e-6;
-/// Samples of silence after which a resting instrument counts as silent.
-const QUIET_SAMPLES: u32 = 4_096;
+/// Time of silence after which a resting instrument counts as silent, s: 4096 samples at 48 kHz, six periods of the lowest note of a
+/// double-bass clarinet.
+pub(super) const QUIET_S: f64 = 4_096.0 / 48_000.0;
 /// Host samples between two checks of level and limiter.
 const CHUNK: usize = 64;
 
@@ -89,8 +90,9 @@ pub struct Clarinet {
     /// Where it is heard from depends on where its player sits among several.
     chair: Chair,
     choke: Choke,
-    /// Samples of silence since the player came to rest.
+    /// Samples of silence since the player came to rest, and how many count as silence.
     quiet: u32,
+    silent_from: u32,
     resets: u64,
 }
 
@@ -144,7 +146,7 @@ impl Clarinet {
             MovingReed {
                 law: ReedLaw::default(),
                 zeta: ZETA_REFERENCE,
-                lay: 0.4,
+                lay: LAY_REFERENCE,
                 resonance_hz: lip.resonance_hz,
                 damping: lip.damping,
                 swept_s: swept,
@@ -180,6 +182,7 @@ impl Clarinet {
             chair: Chair::default(),
             choke: Choke::new(host_rate_hz),
             quiet: 0,
+            silent_from: (QUIET_S * host_rate_hz).ceil() as u32,
             resets: 0,
         }
     }
@@ -508,7 +511,7 @@ impl Clarinet {
 
     /// True when the output is silent and the player rests: the host may stop calling.
     pub fn is_silent(&self) -> bool {
-        self.quiet > QUIET_SAMPLES
+        self.quiet > self.silent_from
     }
 
     /// How often a state that was not finite had to be reset since the start.

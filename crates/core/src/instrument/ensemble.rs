@@ -22,7 +22,7 @@ use crate::dsp::lanes::any_above;
 use crate::dsp::limiter::Limiter;
 use crate::event::{Event, PartEvent, SettingNumber, Timed, To};
 use crate::instrument::channels::Channels;
-use crate::instrument::clarinet::{Clarinet, Progress};
+use crate::instrument::clarinet::{Clarinet, Progress, QUIET_S};
 use crate::instrument::listening::ListeningMode;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::person::Person;
@@ -36,8 +36,6 @@ use section::Section;
 
 /// Samples of the host between two decisions whether a player sleeps.
 const CELL: usize = 64;
-/// Cells of silence and rest after which a player sleeps: 85 ms at 48 kHz, as long as a [`Clarinet`] takes to count as silent.
-const QUIET_CELLS: u32 = 64;
 /// Time that a change of seat, pan or number takes, s.
 const MOVE_S: f64 = 0.010;
 
@@ -53,8 +51,9 @@ struct Seat {
     at: usize,
     /// Whether any of them is heard.
     is_heard: bool,
-    /// Cells of silence and rest until now.
+    /// Cells of silence and rest until now, and how many send it to sleep.
     quiet: u32,
+    sleeps_from: u32,
     sleeps: bool,
     /// A lone player does not sleep: its host stops calling.
     may_sleep: bool,
@@ -72,6 +71,7 @@ impl Seat {
             at: 0,
             is_heard: false,
             quiet: 0,
+            sleeps_from: (QUIET_S * rate_hz / CELL as f64).ceil() as u32,
             sleeps: true,
             may_sleep: true,
             sound: [[0.0; CELL]; 2],
@@ -185,7 +185,7 @@ impl Seat {
             self.at = 0;
             let is_quiet = !std::mem::take(&mut self.is_heard) && self.clarinet.is_resting();
             self.quiet = if is_quiet { self.quiet.saturating_add(1) } else { 0 };
-            self.sleeps |= self.may_sleep && self.quiet >= QUIET_CELLS;
+            self.sleeps |= self.may_sleep && self.quiet >= self.sleeps_from;
         }
     }
 

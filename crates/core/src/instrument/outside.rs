@@ -15,6 +15,7 @@ mod tests;
 use crate::bore::lattice::choir::LatticeChoir;
 use crate::bore::lattice::{HoleFlows, LANES, LatticeCoeffs, Real};
 use crate::bore::sound_sources::SoundSources;
+use crate::dsp::smooth::smooth_single;
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::{Listening, ListeningMode};
 use crate::instrument::presence::Presence;
@@ -306,8 +307,7 @@ impl<F: Real> Outside<F> {
         for (new, old) in self.out.iter_mut().zip(old) {
             for (n, (new, old)) in new.iter_mut().zip(old).enumerate() {
                 // Without a kink at either end, which would be heard as a faint click.
-                let way = (done + n + 1) as f32 / (ticks * TICK) as f32;
-                let part = way * way * (3.0 - 2.0 * way);
+                let part = smooth_single((done + n + 1) as f32 / (ticks * TICK) as f32);
                 *new = old + part * (*new - old);
             }
         }

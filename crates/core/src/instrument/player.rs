@@ -44,6 +44,7 @@ mod voicing;
 use crate::bore::lattice::Real;
 use crate::control::keys::Keys;
 use crate::event::{Event, Fingerings};
+use crate::instrument::bend;
 use crate::instrument::breath_noise::Jet;
 use crate::instrument::model::Model;
 use crate::instrument::person::Person;
@@ -77,8 +78,6 @@ use voicing::{Voiced, Voicing};
 
 /// Time the fingers take behind the tongue, ms; slurred they take the setting's time.
 const TONGUED_FINGERS_MS: f64 = 5.0;
-/// Widest bend an event may ask for, cents either way: 48 semitones, the range of an MPE note.
-const BEND_CENTS: f32 = 4_800.0;
 
 /// What the parts of a player need to know in one control tick.
 struct TickContext<'a> {
@@ -130,6 +129,8 @@ pub struct Player {
     now: Settings,
     /// `None` until the next tick works it out.
     posture: Option<Posture>,
+    /// Closing pressure of the reed in the last tick, over the reference.
+    closing: f64,
     keys: Keys,
     velocities: Velocities,
     breath: Breath,
@@ -165,6 +166,7 @@ impl Player {
     pub fn new(person: Person) -> Self {
         Self {
             person,
+            closing: 1.0,
             swaying: Swaying::of(&person),
             techniques: PlayedTechniques::of(&person),
             // The voice at its beginning knows the reference reed alone.
@@ -218,11 +220,6 @@ impl Player {
         TICK as f64 / (model.coeffs.rate_hz * self.tuning.speed())
     }
 
-    /// Closing pressure of the reed over the reference.
-    fn closing(&self) -> f64 {
-        self.posture.as_ref().map_or(1.0, |posture| posture.closing)
-    }
-
     /// Held note, fingering and mouth pressure now.
     pub fn state(&self, model: &Model) -> PlayerState {
         let (key, fingering) = (self.keys.last(), self.fingers.fingering().unwrap_or(0));
@@ -231,7 +228,7 @@ impl Player {
             key,
             sounding: key.and(written).and_then(|written| written.sounding(model.file.transposition)),
             fingering,
-            mouth_kpa: (1e-3 * P_REF_PA * self.closing() * self.breath.gamma()) as f32,
+            mouth_kpa: (1e-3 * P_REF_PA * self.closing * self.breath.gamma()) as f32,
             lip: self.posture.as_ref().and_then(Posture::lip),
             dynamic: self.response.dynamic().map(|dynamic| dynamic as f32),
             chosen: self.chosen,
@@ -255,7 +252,8 @@ impl Player {
             Event::KeyPressure(pressure) => self.breath.press(pressure),
             Event::BreathFromKeys => self.breath.forget_source(),
             Event::Bend { cents } => {
-                self.bend_cents = f64::from(clamped_or(cents, -BEND_CENTS, BEND_CENTS, 0.0));
+                let most = bend::MOST_CENTS as f32;
+                self.bend_cents = f64::from(clamped_or(cents, -most, most, 0.0));
                 self.posture = None;
             }
             Event::Reed { h, k } => self.reed.set(h, k),
@@ -578,7 +576,8 @@ impl Player {
         let key_down = holds_note(&self.keys, &self.inflection, &self.tongue);
         let tongue_holds = self.tongue.is_holding();
         let asked = self.breath.asked(key_down);
-        self.ear.hear(voice.p_mouthpiece() / posture.closing, posture.lags.ear);
+        // A posture that has just been worked out has yet to get the lip of the dynamic.
+        self.ear.hear(voice.p_mouthpiece() / self.closing, posture.lags.ear);
         let led = Led::new(self.voicing.lead(), slides);
         let ear = (led == Led::default() && self.tongue.is_away() && !self.breath.is_dipping())
             .then_some(&self.ear);
@@ -605,6 +604,7 @@ impl Player {
             posture.loosen_lip(kept.lip);
             target = kept.gamma;
         }
+        self.closing = posture.closing;
         let context = TickContext { tick_s, settings, posture };
         let note_hz = model.notes_hz[fingering.unwrap_or(0)];
         voice.set_tract(self.voicing.tick(settings, note_hz, bent, posture.lags.tract, model.coeffs.rate_hz));

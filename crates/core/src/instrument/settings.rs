@@ -1,5 +1,6 @@
 //! What a player can set, as plain numbers in the units that a player uses. They are clamped once, where they come in.
 
+use crate::bore::lattice::JET_LOSS_REFERENCE;
 use crate::event::{Fingerings, SettingNumber};
 use crate::instrument::articulation::Articulation;
 use crate::instrument::concert_pitch::A4_RANGE_HZ;
@@ -14,7 +15,7 @@ use crate::instrument::room::Room;
 use crate::instrument::techniques::{Techniques, Tract};
 use crate::reed::ReedLaw;
 use crate::reed::law::{H_INIT, K_INIT, ZETA_RANGE, coupled_k};
-use crate::reed::physical::{P_REF_PA, PhysicalReed, ZETA_REFERENCE};
+use crate::reed::physical::{LAY_REFERENCE, P_REF_PA, PhysicalReed, ZETA_REFERENCE};
 use crate::reed::strength;
 use crate::units::clamped_or;
 
@@ -166,7 +167,7 @@ impl Default for Settings {
             lip: 1.0,
             zeta: ZETA_REFERENCE as f32,
             damping: 1.0,
-            lay: 0.4,
+            lay: LAY_REFERENCE as f32,
             reed_h: H_INIT as f32,
             reed_k: K_INIT as f32,
             coupled: true,
@@ -174,7 +175,7 @@ impl Default for Settings {
             a4_hz: 440.0,
             tuning: Tuning::Tempered,
             temperature_c: 25.0,
-            vent_loss: 2.0,
+            vent_loss: JET_LOSS_REFERENCE as f32,
             gain_db: -2.5,
             listening: Listening::default(),
             reach: Reach::default(),

@@ -37,6 +37,10 @@ pub const REFERENCE_VOLUME_M3: f64 = 1.2e-6;
 /// Embouchure parameter of the reference reed.
 pub const ZETA_REFERENCE: f64 = 0.3;
 
+/// Half-width of the knee of the reference reed's lay: how gradually the reed closes on a curved facing (`docs/tone.md`, *The knee of the
+/// lay*).
+pub const LAY_REFERENCE: f64 = 0.4;
+
 /// A reed in the notebook's dimensionless numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DimensionlessReed {

@@ -40,6 +40,14 @@ pub struct KnobDesign {
     pub dead_off_deg: f64,
 }
 
+impl KnobDesign {
+    /// The same way to full blow, from zero: for a knob that counts its angles from where the player does not blow.
+    #[must_use]
+    pub fn from_zero(self) -> Self {
+        Self { zero_deg: 0.0, full_deg: self.full_deg - self.zero_deg, ..self }
+    }
+}
+
 /// One turn without a curve; the dead zone is a few steps of an encoder of 0.1 degrees.
 impl Default for KnobDesign {
     fn default() -> Self {

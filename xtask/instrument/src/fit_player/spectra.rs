@@ -5,9 +5,9 @@
 
 use chalumeau_core::analysis::pitch::OTHER_CENTS;
 use chalumeau_core::analysis::{pitch, spectrum};
-use chalumeau_core::instrument::held_note::{HeldNote, Start};
 use chalumeau_core::instrument::player::dynamics::{LipShape, PlayerModel};
 use chalumeau_core::instrument::presence::Presence;
+use chalumeau_core::instrument::trial_note::{Start, TrialNote};
 use chalumeau_core::instrument::{Listening, Model};
 use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
@@ -124,7 +124,7 @@ impl PlayedSpectrum {
         moment / sum
     }
 
-    fn hear(model: &Model, held: &HeldNote, opening: f64, wanted_hz: f64) -> Option<Self> {
+    fn hear(model: &Model, held: &TrialNote, opening: f64, wanted_hz: f64) -> Option<Self> {
         let rate_hz = model.coeffs.rate_hz;
         let sound = held.radiated(model, HEARD_S.0, HEARD_S.1);
         let hz = pitch::fundamental_hz(&sound, rate_hz)?;
@@ -155,8 +155,8 @@ impl NoteSpectra {
             let channel = zeta / ZETA_REFERENCE / opening.sqrt();
             let lip = LipShape { opening, channel, knee: PlayerModel::FITTED.knee_at(place, opening) };
             let point = |gamma: f64| {
-                let new = HeldNote::new(model, fingering, gamma);
-                let held = HeldNote {
+                let new = TrialNote::new(model, fingering, gamma);
+                let held = TrialNote {
                     law: lip.law(ReedLaw::default()),
                     zeta: ZETA_REFERENCE * lip.channel,
                     lay: new.lay * lip.knee,

@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use super::*;
 use crate::bore::lattice::{Lattice, Tip};
 use crate::bore::transfer_matrix::TransferMatrix;
+use crate::dsp::smooth::smooth_single;
 use crate::event::Event;
 use crate::instrument::{Channels, Clarinet, Model, Settings};
 use crate::measure::radiated_bands::LINES;
@@ -264,7 +265,7 @@ fn a_point_that_fades_in_begins_with_the_flows_of_the_tick_before() {
     let faded = heard(&everywhere, &Listening::point());
     for n in 0..TICK {
         let way = (n + 1) as f32 / (FADE_TICKS as usize * TICK) as f32;
-        assert_eq!(faded[n], old[n] + way * way * (3.0 - 2.0 * way) * (new[n] - old[n]), "sample {n}");
+        assert_eq!(faded[n], old[n] + smooth_single(way) * (new[n] - old[n]), "sample {n}");
     }
     assert!(old.iter().zip(&new).any(|(old, new)| (old - new).abs() > 1e-6));
 }

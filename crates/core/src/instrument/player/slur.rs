@@ -22,19 +22,18 @@
 //! on to their twelfth as the low chalumeau does, it damps the reed.
 
 use super::lip_glide::LipHelp;
+use crate::reed::physical::LAY_REFERENCE;
 
 /// Notes below this place of the compass (between written D#4 and E4 of a B flat clarinet) hold on to their second mode.
 pub(super) const LOW_PLACE: f64 = -0.43;
 /// Slurs down over at least so many cents from clarion to low chalumeau.
 const LEAP_CENTS: f64 = 650.0;
-/// The least mouth over closing pressure at which a slur needs help: where the reed beats. Measured: at 0.47 a slur from written B4 to B3 is
+/// The least mouth over closing pressure at which a slur needs help: where the reed beats. All of these are for the reference facing. Measured: at 0.47 a slur from written B4 to B3 is
 /// lost at CC 58.
 const BEATING: f64 = 0.45;
 /// The same for slurs of less than so many cents. Measured: with help from 0.45 on, those of 8 and 9 semitones are up to 3.5 dB louder on the way
 /// than either note.
 const NARROW: (f64, f64) = (950.0, 0.5);
-/// The curve of the facing for which these were measured.
-const LAY: f64 = 0.4;
 /// By how much less mouth over closing pressure a slur needs help, for each unit of a straighter facing, on which the reed beats sooner. Of 56
 /// slurs from written B4..F5 to B3..F#4 at velocities of 40 and 60, with the presets *Glass facing* (0), *Bass with teeth* (0.1), *Wedding march*
 /// (0.12), *Swing section* (0.28) and *Keys, bright tongue* (0.3), 169 of 560 were wrong after 0.13 s and 53 after 0.55 s; with this and
@@ -155,7 +154,7 @@ impl Slur {
 
     /// By how much straighter the facing is than the one for which this was measured.
     fn straighter(&self) -> f64 {
-        (LAY - self.lay).max(0.0)
+        (LAY_REFERENCE - self.lay).max(0.0)
     }
 
     /// Whether the fingers alone, from the bell, would take the old mode along at a mouth over closing pressure.
@@ -281,7 +280,7 @@ mod tests {
             place,
             note_hz: 147.0 * over_lowest,
             over_lowest,
-            lay: LAY,
+            lay: LAY_REFERENCE,
             damping: 1.0,
         }
     }

@@ -5,6 +5,7 @@
 //! has begun, and goes on through slurs.
 
 use super::sway::{SWAY_TICKS, Sway};
+use crate::dsp::smooth::smooth;
 use crate::dsp::white::White;
 use crate::instrument::person::Person;
 use crate::units::clamped_or;
@@ -144,9 +145,9 @@ impl Swing {
             self.strength = [self.strength[1], 1.0 + uneven * UNEVEN.1 * self.white.next()];
         }
         let onset = f64::from(vibrato.onset_s);
-        let grown = if self.since_s < onset { self.since_s / onset } else { 1.0 };
+        let grown = if self.since_s < onset { smooth(self.since_s / onset) } else { 1.0 };
         let [before, now] = self.strength;
-        let depth = self.depth * grown * grown * (3.0 - 2.0 * grown) * (before + (now - before) * self.turn);
+        let depth = self.depth * grown * (before + (now - before) * self.turn);
         let depth = depth.min(1.0 + UNEVEN.1);
         let swing = depth * sine(self.turn);
         let dynamic = range_db.map_or(PHYSICAL_SWING, |range_db| DEEPEST_DB / range_db);

@@ -9,10 +9,10 @@
 
 use std::ops::ControlFlow;
 
-use crate::instrument::held_note::HeldNote;
 use crate::instrument::model::Model;
 use crate::instrument::prepare::trial_pitch::trial_pitch_hz;
 use crate::instrument::side_by_side::{self, Stand};
+use crate::instrument::trial_note::TrialNote;
 use crate::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
 use crate::maths;
 use crate::units::cents;
@@ -71,14 +71,14 @@ fn listening_s(model: &Model, gamma: f64) -> (f64, f64) {
 
 /// Pitch of a held note, Hz, or `None` if it is not periodic or more than 150 cents from `wanted_hz`. Plays the note for
 /// about a second, longer on larger instruments. Allocates.
-pub fn heard_hz(model: &Model, note: &HeldNote, wanted_hz: f64) -> Option<f64> {
+pub fn heard_hz(model: &Model, note: &TrialNote, wanted_hz: f64) -> Option<f64> {
     side_by_side::alone(async |stand| heard_within(stand, model, note, wanted_hz, OTHER_NOTE_CENTS.0).await)
 }
 
 async fn heard_within(
     stand: &Stand,
     model: &Model,
-    note: &HeldNote,
+    note: &TrialNote,
     wanted_hz: f64,
     own_cents: f64,
 ) -> Option<f64> {
@@ -111,7 +111,7 @@ impl Trial<'_> {
         // The modes are as the odd numbers; the limit is half-way to the next higher one.
         let mode = self.model.file.fingerings[self.fingering].mode as f64;
         let half_way = 600.0 * maths::log2((2.0 * mode + 1.0) / (2.0 * mode - 1.0));
-        let note = HeldNote { rows, ..HeldNote::new(self.model, self.fingering, self.gamma) };
+        let note = TrialNote { rows, ..TrialNote::new(self.model, self.fingering, self.gamma) };
         let own_cents = half_way.min(OTHER_NOTE_CENTS.1);
         let hz = heard_within(self.stand, self.model, &note, wanted, own_cents).await?;
         Some(PlayedTrim { rows, off_cents: cents(hz, wanted) })

@@ -9,13 +9,13 @@
 use std::ops::ControlFlow;
 
 use crate::analysis::pitch::OTHER_CENTS;
-use crate::instrument::held_note::{HeldNote, TONGUE_HOLD_S};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::player::dynamics::{LOWEST_ONSET, NODE_DYNAMICS, NODES};
 use crate::instrument::prepare::auto_tune::{Accuracy, longer};
 use crate::instrument::prepare::trial_pitch::trial_pitch_hz;
 use crate::instrument::side_by_side::{self, BlownBeside, Stand};
+use crate::instrument::trial_note::{TONGUE_HOLD_S, TrialNote};
 use crate::instrument::tuning_table::{NoteTuning, TuningTable};
 use crate::instrument::voice::{Drive, TICK};
 use crate::maths;
@@ -77,7 +77,7 @@ struct Diminuendo<'a> {
     fingering: usize,
     stand: &'a Stand,
     voice: BlownBeside,
-    held: HeldNote,
+    held: TrialNote,
     /// Dynamic of the lip.
     dynamic: f64,
     /// Force of the tongue, 0..=1.
@@ -217,7 +217,7 @@ impl<'a> Diminuendo<'a> {
         tuned: &NoteTuning,
         gamma: f64,
     ) -> Option<Self> {
-        let held = HeldNote { rows: tuned.natural, ..HeldNote::played(model, fingering, 1.0, gamma) };
+        let held = TrialNote { rows: tuned.natural, ..TrialNote::played(model, fingering, 1.0, gamma) };
         let longer = longer(model);
         let mut note = Self {
             model,
@@ -275,8 +275,8 @@ impl<'a> Diminuendo<'a> {
         for step in 1..=steps {
             let way = f64::from(step) / f64::from(steps);
             let (dynamic, gamma) = (from + way * (dynamic - from), from_gamma + way * (gamma - from_gamma));
-            let lip = HeldNote::played(self.model, self.fingering, dynamic, gamma);
-            self.held = HeldNote { rows: self.held.rows, ..lip };
+            let lip = TrialNote::played(self.model, self.fingering, dynamic, gamma);
+            self.held = TrialNote { rows: self.held.rows, ..lip };
             self.play(self.longer * CHANGE_S / f64::from(steps), |_, _, _| {}).await;
         }
         (self.dynamic, self.wanted) = (dynamic, wanted);

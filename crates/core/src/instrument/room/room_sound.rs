@@ -6,6 +6,7 @@ use super::delay_line::{DelayLine, PIECE};
 use super::room_coeffs::{LINES, LONGEST_EARLY_S, RoomCoeffs, Tap};
 use super::seats::Seats;
 use crate::dsp::glide::Glide;
+use crate::dsp::smooth::smooth_single;
 
 /// Time that a change of the amount takes, s.
 const AMOUNT_S: f64 = 0.02;
@@ -285,10 +286,7 @@ impl RoomSound {
     /// How much of the new room there is, sample by sample, without a kink at either end.
     fn weights(&self) -> Piece {
         let done = self.fade - self.fading;
-        std::array::from_fn(|n| {
-            let way = ((done + n + 1) as f32 / self.fade as f32).min(1.0);
-            way * way * (3.0 - 2.0 * way)
-        })
+        std::array::from_fn(|n| smooth_single((done + n + 1) as f32 / self.fade as f32))
     }
 
     /// Adds what the ears hear, and counts the silence.

@@ -119,14 +119,17 @@ fn a_held_note_beside_others_gives_the_bits_it_gives_alone() {
 /// Notes of all kinds: from one point and from everywhere, and with a delay that glides and arrives within a tick.
 #[cfg(feature = "fit")]
 fn held_notes_beside_each_other(model: &Model) {
-    use crate::instrument::held_note::HeldNote;
+    use crate::instrument::trial_note::TrialNote;
     use crate::instrument::voice::TICK;
     let note = |of: usize| {
         let rows = 0.37 * of as f64 - 2.0;
         let fingering = 3 * of % model.tuning.notes.len();
         let gamma = 0.4 + 0.03 * of as f64;
-        let held = HeldNote::played(model, fingering, 1.0 - 0.05 * of as f64, gamma);
-        HeldNote { rows, ..if of.is_multiple_of(2) { held } else { HeldNote::new(model, fingering, gamma) } }
+        let held = TrialNote::played(model, fingering, 1.0 - 0.05 * of as f64, gamma);
+        TrialNote {
+            rows,
+            ..if of.is_multiple_of(2) { held } else { TrialNote::new(model, fingering, gamma) }
+        }
     };
     let drive = |of: usize, tick: usize| {
         let (note, reed) = (note(of), note(of).reed(model));

@@ -97,6 +97,8 @@ pub enum Doubt {
     },
     /// STATE: the angle jumped, degrees.
     Jump(f64),
+    /// STATE: the angle has jumped too often: no place is believed any more.
+    Jumps(u32),
     /// ARM had no effect.
     DeafToArm,
     /// FEEL is not echoed.
@@ -160,6 +162,9 @@ impl fmt::Display for Doubt {
                 "the knob's angle changed by {angle_deg:.0} degrees and its speed says {speed_deg:.0}"
             ),
             Self::Jump(degrees) => write!(f, "the knob's angle jumped by {degrees:.0} degrees"),
+            Self::Jumps(times) => {
+                write!(f, "the knob's angle has jumped {times} times, so it does not blow any more")
+            }
             Self::DeafToArm => f.write_str("the knob does not arm and gives no reason"),
             Self::DeafToFeel => f.write_str("the knob does not take over the feel that it is sent"),
         }
@@ -351,9 +356,10 @@ impl Trust {
         let is_ours = expected.zero_us.is_some_and(|at| now_us - at < ZERO_US);
         if way_deg.abs() > longest_deg && !is_ours {
             self.settling = SETTLED;
-            self.jumps += 1;
+            self.jumps = self.jumps.saturating_add(1);
             self.compared = Compared::default();
-            return Some(Doubt::Jump(way_deg));
+            let is_believed = self.jumps <= JUMPS_MOST;
+            return Some(if is_believed { Doubt::Jump(way_deg) } else { Doubt::Jumps(self.jumps) });
         }
         self.settling = self.settling.saturating_sub(1);
         let compared = &mut self.compared;

@@ -7,6 +7,7 @@
 //! It is a technique of the chalumeau. Above the break so much damping silences a note, or leaves it to a lower mode, so a player covers little of
 //! the reed there.
 
+use crate::dsp::smooth::smooth;
 use crate::maths;
 use crate::reed::MovingReed;
 
@@ -23,8 +24,8 @@ const LEFT_ABOVE: f64 = 0.2;
 
 /// How much the lip covers a note at a [place](super::super::dynamics::PlayerModel::place) where the player is asked for `amount`, 0..=1.
 pub fn at_place(amount: f64, place: f64) -> f64 {
-    let way = ((place - BREAK.0) / (BREAK.1 - BREAK.0)).clamp(0.0, 1.0);
-    amount * (1.0 - (1.0 - LEFT_ABOVE) * way * way * (3.0 - 2.0 * way))
+    let above = smooth((place - BREAK.0) / (BREAK.1 - BREAK.0));
+    amount * (1.0 - (1.0 - LEFT_ABOVE) * above)
 }
 
 /// The reed under a lip that covers it by `amount`, 0..=1.

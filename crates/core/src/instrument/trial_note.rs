@@ -2,6 +2,7 @@
 //!
 //! Tuning, thresholds and the tests of physics play it; a musician plays through the [`player`](super::player).
 
+use crate::bore::lattice::JET_LOSS_REFERENCE;
 use crate::bore::sound_sources::SoundSources;
 use crate::instrument::lip::embouchure;
 use crate::instrument::listening::Listening;
@@ -12,7 +13,7 @@ use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::motion::TONGUE_FORCE;
-use crate::reed::physical::ZETA_REFERENCE;
+use crate::reed::physical::{LAY_REFERENCE, ZETA_REFERENCE};
 use crate::reed::{MovingReed, ReedCoeffs};
 
 /// How a held note begins.
@@ -29,7 +30,7 @@ pub const TONGUE_HOLD_S: f64 = 0.020;
 
 /// A held note. [`new`](Self::new) gives the reference clarinet's numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeldNote {
+pub struct TrialNote {
     /// Index of the fingering in the instrument file.
     pub fingering: usize,
     /// Mouth pressure over the closing pressure.
@@ -54,7 +55,7 @@ pub struct HeldNote {
     pub listening: Listening,
 }
 
-impl HeldNote {
+impl TrialNote {
     /// A fingering (index in the file) at a mouth pressure over the closing pressure; everything else as on the reference
     /// clarinet, with the natural trim and without noise.
     ///
@@ -66,9 +67,9 @@ impl HeldNote {
             gamma,
             law: ReedLaw::default(),
             zeta: ZETA_REFERENCE,
-            lay: 0.4,
+            lay: LAY_REFERENCE,
             damping: 1.0,
-            jet_loss: 2.0,
+            jet_loss: JET_LOSS_REFERENCE,
             noise: 0.0,
             rows: model.tuning.notes[fingering].natural,
             start: Start::Ramp(20.0),
