@@ -394,6 +394,8 @@ impl Chalumeau {
     fn heed_transport(&mut self, runs: bool) {
         let ran = std::mem::replace(&mut self.transport_ran, runs);
         if ran && !runs {
+            // A host may end overlapping notes of one key with one message when it stops.
+            self.inputs.forget_repeats();
             #[cfg(feature = "devices")]
             if let Some((_, audio)) = &self.knob {
                 audio.let_go(Release::TransportStopped);

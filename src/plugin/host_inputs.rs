@@ -80,6 +80,11 @@ impl HostInputs {
         self.waiting.clear();
     }
 
+    /// See [`Parts::forget_repeats`](chalumeau_core::control::parts::Parts::forget_repeats).
+    pub fn forget_repeats(&mut self) {
+        self.translator.forget_repeats();
+    }
+
     /// Begins a block, whose notes are split into so many parts.
     pub fn begin_block(&mut self, parts: usize) {
         self.ended.clear();

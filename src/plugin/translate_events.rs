@@ -41,6 +41,11 @@ impl EventTranslator {
         is_other
     }
 
+    /// See [`Parts::forget_repeats`].
+    pub fn forget_repeats(&mut self) {
+        self.midi.forget_repeats();
+    }
+
     /// The events of a host's event, in order. `is_reeds`: it changes the reed, so that its pressure is no breath.
     pub fn translate<S>(&mut self, event: &NoteEvent<S>, is_reeds: bool) -> &[PartEvent] {
         match *event {

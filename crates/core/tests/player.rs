@@ -109,6 +109,52 @@ fn medians(wanders: &[Wander]) -> [f64; 6] {
     ]
 }
 
+/// The breath of a held key rises from nothing to CC 100 in 1 and 2 s.
+#[test]
+fn what_grows_out_of_nothing_does_not_begin_louder_than_it_goes_on() {
+    let notes: Vec<u8> = NOTES.collect();
+    let dips = each(2 * notes.len(), |n| {
+        let (written, seconds) = (notes[n / 2], 1.0 + (n % 2) as f64);
+        let mut events = vec![controller(10), controller(0), key(0.05, written)];
+        events.extend((1..=100).map(|value| (0.2 + seconds * f64::from(value) / 100.0, controller(value).1)));
+        let sound = rendered(&Settings { noise: 0.0, ..still() }, &events, 0.8 * seconds);
+        let levels: Vec<f64> = sound.chunks(sample(0.02)).map(level_db).collect();
+        // The least after the loudest until then, from where the note is heard.
+        let mut loudest = f64::NEG_INFINITY;
+        let dips = levels.iter().skip_while(|&&level| level < -70.0).map(|&level| {
+            loudest = loudest.max(level);
+            loudest - level
+        });
+        (written, dips.fold(0.0, f64::max))
+    });
+    let worst = dips.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    println!("{:.1} dB on {}", worst.1, WrittenNote(worst.0));
+    assert!(worst.1 < 5.0, "{} goes down by {:.1} dB", WrittenNote(worst.0), worst.1);
+}
+
+/// A slow tongue on a damped reed: sounding C5 to G5 and back, each for 0.12 s of 0.14.
+#[test]
+fn who_plays_quickly_tongues_quickly() {
+    let settings = Settings { tongue_ms: 18.0, damping: 1.4, ..still() };
+    let notes = [74, 76, 78, 79, 81, 79, 78, 76];
+    let loudest = |step_s: f64, on_s: f64| {
+        let struck = |note| Event::NoteOn { note: sounding(note), velocity: 0.4 };
+        let begin = |n: usize| 0.1 + step_s * n as f64;
+        let keys = notes.iter().enumerate();
+        let events: Vec<_> =
+            keys.flat_map(|(n, &note)| [(begin(n), struck(note)), release(begin(n) + on_s, note)]).collect();
+        let sound = rendered(&settings, &events, begin(notes.len()));
+        let of = |n: usize| &sound[sample(begin(n))..sample(begin(n) + on_s)];
+        let level = |n: usize| of(n).chunks(sample(0.01)).map(level_db).fold(f64::MIN, f64::max);
+        (0..notes.len()).map(level).collect::<Vec<_>>()
+    };
+    let (quick, held) = (loudest(0.14, 0.12), loudest(1.2, 1.0));
+    let softer: Vec<f64> = held.iter().zip(&quick).map(|(held, quick)| held - quick).collect();
+    println!("{softer:.1?} dB softer");
+    // Before the first there is no other.
+    assert!(softer[1..].iter().all(|&db| db < 3.0), "{softer:.1?}");
+}
+
 /// The lip is worked out anew at each of these events, and must be where it was.
 #[test]
 fn bends_that_change_nothing_leave_every_sample() {

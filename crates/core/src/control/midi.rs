@@ -7,8 +7,8 @@
 //! what volume and pan do, `controllers` what all the others do. [Key switches](super::key_switches) do not reach it. Bend follows the heard note's channel and its MPE zone, see [`bends`](super::bends); RPN 0 sets a
 //! bend range, RPN 6 a zone. [`techniques`] says what the mod wheel and CC18 to CC20 do.
 //!
-//! While the sustain pedal (CC64) is down, the last note goes on after its key has come up, until the pedal comes up or another key is struck, which slurs; the same key again is tongued. Left out: balance (CC8),
-//! portamento, sostenuto and soft pedal, program and bank.
+//! While the sustain pedal (CC64) is down, the last note goes on after its key has come up, until the pedal comes up or another key is struck, which slurs; the same key again is tongued. A key that is struck again before it has come up is tongued, too, and comes up as often as it was
+//! struck. Left out: balance (CC8), portamento, sostenuto and soft pedal, program and bank.
 //!
 //! Source: MIDI 1.0 Detailed Specification 4.2.1 (1996), control change numbers and registered parameters; RP-015 for
 //! CC121; RP-053 for MPE. Data bytes above 127 are read as 127 and channels modulo 16, so that every
@@ -167,13 +167,14 @@ impl MidiDecoder {
         let note = Note { channel: note.channel % 16, key: note.key.min(127), ..note };
         self.velocity = f32::from(velocity.clamp(1, 127)) / 127.0;
         let by_pedal = self.notes.take_by_pedal();
+        let is_repeated = self.sounding().or(by_pedal).is_some_and(|before| before.key == note.key);
         self.notes.press(note);
         self.prepare_note(note.channel);
         self.leave_note_breath();
         // A finger that does not press yet is about to.
         self.blow_member(|unit| unit > 0.0);
         self.remix();
-        if by_pedal.is_some_and(|held| held.key == note.key) {
+        if is_repeated {
             self.lift(note.key);
         }
         self.finger(note.key);
@@ -212,9 +213,14 @@ impl MidiDecoder {
     pub fn release(&mut self, address: NoteAddress) -> &[Event] {
         self.begin();
         let before = self.sounding();
-        self.notes.release(address, self.pedal);
+        self.notes.release_one(address, self.pedal);
         self.hear_next(before);
         self.said.events()
+    }
+
+    /// See [`Notes::forget_repeats`]. Real-time safe.
+    pub fn forget_repeats(&mut self) {
+        self.notes.forget_repeats();
     }
 
     /// Notes end at once, whatever the pedal does. Real-time safe.

@@ -1,7 +1,8 @@
 //! The notes that are held, and which of them is heard: the last one struck; when it is released, the one before it.
 //!
 //! A note is known by the id that its host gave it, its channel and its key, so that two notes of one key can be held at
-//! once. What belongs to a note (tuning, volume, pan, breath) stays with it while another one is heard. A pedal can hold
+//! once. Without ids, as in MIDI, a key that is struck again before it has come up comes up as often as it was struck: parts that were recorded
+//! or quantised overlap so, and the end of the first note must not end the second. What belongs to a note (tuning, volume, pan, breath) stays with it while another one is heard. A pedal can hold
 //! the last note after its key has come up. Real-time safe throughout.
 //!
 //! Source: CLAP 1.2, `events.h`: how note events name notes, and what a host wants to hear about their ends.
@@ -83,6 +84,8 @@ pub struct HeldNote {
     pub press: Option<f32>,
     /// The key has come up; the pedal holds the note.
     is_by_pedal: bool,
+    /// How often the key is to come up without ending the note: once for each time that it was struck again.
+    ends_to_pass: u8,
 }
 
 impl HeldNote {
@@ -96,6 +99,7 @@ impl HeldNote {
             brightness: None,
             press: None,
             is_by_pedal: false,
+            ends_to_pass: 0,
         }
     }
 
@@ -184,6 +188,8 @@ impl Notes {
 
     /// A note begins; again, if it was held.
     pub fn press(&mut self, note: Note) {
+        let again = self.held().iter().find(|held| held.note == note && note.id.is_none());
+        let ends_to_pass = again.map_or(0, |held| held.ends_to_pass.saturating_add(1));
         self.remove_where(|held| held.note == note, |_, _| ());
         if self.count == MOST {
             let oldest = self.held[0].note;
@@ -193,8 +199,25 @@ impl Notes {
             self.end(fading);
         }
         self.released = None;
-        self.held[self.count] = HeldNote::new(note);
+        self.held[self.count] = HeldNote { ends_to_pass, ..HeldNote::new(note) };
         self.count += 1;
+    }
+
+    /// Every key that is down comes up at the next end of its notes, however often it was struck: what a host sends when it stops in the
+    /// middle of overlapping notes.
+    pub fn forget_repeats(&mut self) {
+        self.held[..self.count].iter_mut().for_each(|held| held.ends_to_pass = 0);
+    }
+
+    /// A key comes up, once. See [`release`](Self::release).
+    pub fn release_one(&mut self, address: NoteAddress, pedal: bool) {
+        let passed = self.held[..self.count]
+            .iter_mut()
+            .find(|held| address.key.is_some() && address.fits(held.note) && held.ends_to_pass > 0);
+        match passed {
+            Some(held) => held.ends_to_pass -= 1,
+            None => self.release(address, pedal),
+        }
     }
 
     /// Keys come up. With `pedal`, the note that sounds stays if no other key holds it up.

@@ -251,6 +251,11 @@ impl Parts {
         self.tell_all(|part| part.release(address))
     }
 
+    /// See [`MidiDecoder::forget_repeats`].
+    pub fn forget_repeats(&mut self) {
+        self.decoders.iter_mut().for_each(MidiDecoder::forget_repeats);
+    }
+
     /// See [`MidiDecoder::choke`].
     pub fn choke(&mut self, address: NoteAddress) -> &[PartEvent] {
         self.switches.release(address);

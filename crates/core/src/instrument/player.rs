@@ -581,7 +581,7 @@ impl Player {
         let led = Led::new(self.voicing.lead(), slides);
         let ear = (led == Led::default() && self.tongue.is_away() && !self.breath.is_dipping())
             .then_some(&self.ear);
-        self.onset.tick(tongue_holds, tick_s);
+        self.onset.tick(tongue_holds, self.tongue.interval_s(), tick_s);
         let sway = self.swaying.tick(is_idle, settings, &posture.lags.life, tick_s, model.player.range_db);
         let in_place = tongue_holds || !key_down;
         let note_lip = self.lip_glide.tick(
@@ -598,6 +598,10 @@ impl Player {
             fade: self.inflection.fade(),
         };
         let mut target = self.response.tick(asked, ear, &bodily, settings, posture);
+        if self.response.is_below() && self.tongue.is_away() {
+            // What begins now begins without the tongue.
+            self.ear.begin(Begun::Breathed);
+        }
         if let Some(dynamic) = self.response.dynamic() {
             let level_db = model.player.level_db(dynamic);
             let kept = self.keeper.tick(heard_power(voice), target, level_db, led, &posture.lags.level);

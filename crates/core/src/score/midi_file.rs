@@ -6,7 +6,7 @@
 //! the end of a track are ignored.
 //!
 //! A key that is struck again before it has come up is let go first, so that both notes begin and end as written: recorded
-//! and quantised parts often overlap so. A player's own hands cannot, and [`MidiDecoder`] takes such keys as slurred. At the end
+//! and quantised parts often overlap so. At the end
 //! of the last track, pedal and keys that are still down come up.
 //!
 //! A damaged file is refused with the byte at which reading stopped; it is not played up to there.
@@ -318,8 +318,8 @@ fn key_of(message: &Message, hands: Hands) -> Option<(KeyOf, bool)> {
     Some(((track, channel.as_int(), key.as_int()), is_down))
 }
 
-/// Notes of one key that overlap, apart: the earlier one ends where the later one begins, and its own end is left out. Only of keys that
-/// come up as often as they are struck; where ends are missing, it cannot be told whose they are.
+/// Notes of one key that overlap, apart: the earlier one ends where the later one begins, and its own end is left out. Of keys that do not
+/// come up as often as they are struck no end is left out: it cannot be told whose they are.
 fn apart(messages: Vec<Message<'_>>, hands: Hands) -> Vec<Message<'_>> {
     let mut balance: HashMap<KeyOf, i32> = HashMap::new();
     for (key, is_down) in messages.iter().filter_map(|message| key_of(message, hands)) {
@@ -328,7 +328,7 @@ fn apart(messages: Vec<Message<'_>>, hands: Hands) -> Vec<Message<'_>> {
     let mut held: HashMap<KeyOf, u32> = HashMap::new();
     let mut all = Vec::with_capacity(messages.len());
     for message in messages {
-        match key_of(&message, hands).filter(|(key, _)| balance.get(key) == Some(&0)) {
+        match key_of(&message, hands) {
             Some((key, true)) => {
                 let held = held.entry(key).or_default();
                 if *held > 0
@@ -341,8 +341,9 @@ fn apart(messages: Vec<Message<'_>>, hands: Hands) -> Vec<Message<'_>> {
                 *held += 1;
             }
             Some((key, false)) => {
+                let is_balanced = balance.get(&key) == Some(&0);
                 let held = held.entry(key).or_default();
-                *held = held.saturating_sub(1);
+                *held = if is_balanced { held.saturating_sub(1) } else { 0 };
                 if *held > 0 {
                     continue;
                 }

@@ -540,7 +540,7 @@ fn an_id_names_one_note_and_no_other() {
 fn two_notes_of_one_key_are_two_notes() {
     let mut midi = MidiDecoder::new();
     assert_eq!(midi.strike(note(1, 60), 127), [on(60)]);
-    midi.strike(note(2, 60), 127);
+    assert_eq!(midi.strike(note(2, 60), 127), [off(60), on(60)], "tongued");
     assert_eq!(midi.release(id(1)), NOTHING, "the other goes on");
     assert_eq!(midi.over(), [note(1, 60)]);
     assert_eq!(midi.release(id(2)), [off(60)]);
@@ -552,6 +552,36 @@ fn two_notes_of_one_key_are_two_notes() {
     assert_eq!(midi.release(id(3)), [on(64)], "slurred to the note before");
     assert_eq!(midi.release(id(2)), [off(64)], "and to the key that was held all the time");
     assert_eq!(midi.release(id(1)), [off(60)]);
+}
+
+/// Hosts whose notes have no ids, as those of VST3 may.
+#[test]
+fn a_key_that_is_struck_again_before_it_comes_up_has_both_notes() {
+    let mut midi = MidiDecoder::new();
+    midi.note_on(0, 60, 127);
+    assert_eq!(midi.note_on(0, 60, 127), [off(60), on(60)], "tongued");
+    assert_eq!(midi.note_off(0, 60), NOTHING, "the end of the first");
+    assert_eq!(midi.note_off(0, 60), [off(60)]);
+    assert_eq!(midi.note_off(0, 60), NOTHING);
+
+    // Below another key.
+    midi.note_on(0, 60, 127);
+    midi.note_on(0, 64, 127);
+    assert_eq!(midi.note_on(0, 60, 127), [on(60)], "slurred to");
+    assert_eq!(midi.note_off(0, 60), NOTHING);
+    assert_eq!(midi.note_off(0, 64), [off(64)]);
+    assert_eq!(midi.note_off(0, 60), [off(60)]);
+
+    // What ends everything, and a host that stops.
+    for _ in 0..3 {
+        midi.note_on(0, 60, 127);
+    }
+    assert_eq!(midi.controller(0, 123, 0), [off(60)]);
+    for _ in 0..3 {
+        midi.note_on(0, 60, 127);
+    }
+    midi.forget_repeats();
+    assert_eq!(midi.note_off(0, 60), [off(60)]);
 }
 
 #[test]

@@ -33,6 +33,8 @@ impl Attack {
 /// Soft: the share of the dynamic that the beginning lacks, and the time constant with which it comes, s: chosen for the delays of
 /// recorded partials, see `docs/tone.md`.
 const SOFT: (f64, f64) = (0.3, 0.18);
+/// Soft: the time constant is at most this share of the time from the note before: who plays quickly attacks quickly.
+const SOFT_OF_INTERVAL: f64 = 0.36;
 /// Hard: what the dynamic begins above, and the time until that is gone, s.
 const HARD: (f64, f64) = (0.2, 0.1);
 /// Hard: how much more quickly the tongue lets go.
@@ -50,10 +52,11 @@ pub fn lip_help(place: f64, note_hz: f64) -> Option<LipHelp> {
     (high > 0.0).then(|| LipHelp { damping: 1.0 - HIGH_FREEDOM * high, length_s: HIGH_PERIODS / note_hz })
 }
 
-/// State: time since the tongue held the reed, s.
+/// State: time since the tongue held the reed, and time from the note before to this one, s.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Onset {
     since_s: f64,
+    interval_s: f64,
 }
 
 impl Attack {
@@ -65,7 +68,8 @@ impl Attack {
 
 impl Onset {
     /// Time goes on by a tick; while the tongue holds the reed before a note it stands still.
-    pub fn tick(&mut self, tongue_holds: bool, tick_s: f64) {
+    pub fn tick(&mut self, tongue_holds: bool, interval_s: f64, tick_s: f64) {
+        self.interval_s = interval_s;
         self.since_s = if tongue_holds { 0.0 } else { self.since_s + tick_s };
     }
 
@@ -75,7 +79,7 @@ impl Onset {
         let left = |time_s: f64| smooth(1.0 - self.since_s / time_s);
         match attack {
             Attack::Normal => dynamic,
-            Attack::Soft => dynamic * (1.0 - SOFT.0 * tail(SOFT.1)),
+            Attack::Soft => dynamic * (1.0 - SOFT.0 * tail(SOFT.1.min(SOFT_OF_INTERVAL * self.interval_s))),
             Attack::Hard => (dynamic + HARD.0 * left(HARD.1)).min(1.0),
         }
     }

@@ -60,6 +60,8 @@ pub struct Response {
     /// Logarithm of the amplitude that the player expects to hear, and of that to which it goes.
     expected: f64,
     wanted: Known<f64, f64>,
+    /// The breath is too soft for any note.
+    is_below: bool,
 }
 
 /// Breath, 0..=1, that a dynamic of 0..=1 asks for; inverse of [`dynamic`].
@@ -106,6 +108,11 @@ impl Response {
         self.lip.is_none() || ear.amplitude() >= SPEAKS * maths::exp(self.expected)
     }
 
+    /// Whether the breath is softer than that from which notes begin.
+    pub fn is_below(&self) -> bool {
+        self.is_below
+    }
+
     /// How much faster the tongue lets go for an attack, as a factor.
     pub fn haste(&self, attack: Attack) -> f64 {
         self.lip.map_or(1.0, |_| attack.release())
@@ -139,6 +146,7 @@ impl Response {
                 (soft + (loud - soft) * velocity, 1.0)
             }
         };
+        self.is_below = of_softest < 1.0;
         let wanted = bodily.fade * bodily.onset.shaped(settings.attack, wanted);
         let lip = match self.lip {
             Some(lip) if !bodily.settles => lip + (wanted - lip) * posture.lags.lip,

@@ -19,6 +19,11 @@ const LATEST_S: f64 = 0.08;
 const QUIET_GAMMA: f64 = 0.15;
 /// See [`QUIET_GAMMA`].
 const LEAST_SPEED: f64 = 0.05;
+/// The tongue takes at most this share of the time since the note before to let go: who plays quickly tongues quickly. With a tongue of 18 ms
+/// and a damped reed, sounding C5 to G5 at a velocity of 50 every 0.14 s were up to 11 dB softer than when held; with this, 1 dB.
+const OF_INTERVAL: f64 = 0.1;
+/// Longer intervals count as this one, s.
+const LONGEST_INTERVAL_S: f64 = 1.0;
 /// How long the tongue takes to reach the reed when it stops a note, s.
 const STOP_S: f64 = 0.005;
 /// Time constant with which the force on the reed grows, s, so that the tongue lands softly.
@@ -52,6 +57,9 @@ pub struct Tongue {
     position: Position,
     /// Time for which it has been away, s, up to [`LATEST_S`].
     away_s: f64,
+    /// Time since it went to the reed before a note, s, and the same when it last went there, both up to [`LONGEST_INTERVAL_S`].
+    since_s: f64,
+    interval_s: f64,
     /// The note before still rings, and it lets go in time with that.
     is_in_time: bool,
     /// The key has come up: it lands as soon as it may.
@@ -69,6 +77,8 @@ impl Default for Tongue {
         Self {
             position: Position::Resting,
             away_s: LATEST_S,
+            since_s: LONGEST_INTERVAL_S,
+            interval_s: LONGEST_INTERVAL_S,
             is_in_time: false,
             is_due: false,
             has_slapped: false,
@@ -88,7 +98,13 @@ impl Tongue {
     pub fn hold(&mut self, is_in_time: bool) {
         self.is_in_time = is_in_time;
         self.position = Position::Holding(HOLD_S);
+        (self.interval_s, self.since_s) = (self.since_s, 0.0);
         (self.away_s, self.is_due, self.has_slapped) = (0.0, false, false);
+    }
+
+    /// Time from the note before to this one, s, up to [`LONGEST_INTERVAL_S`].
+    pub fn interval_s(&self) -> f64 {
+        self.interval_s
     }
 
     /// Stops the note; one that has hardly begun is played until it speaks, for [`LATEST_S`] at most. Until then it [is due](Self::is_due).
@@ -220,6 +236,7 @@ impl Tongue {
     ) -> f64 {
         let tick_s = context.tick_s;
         let speed = speed(gamma);
+        self.since_s = (self.since_s + tick_s).min(LONGEST_INTERVAL_S);
         let (position, share) = match self.position {
             Position::Resting => (Position::Resting, 1.0),
             Position::Away => {
@@ -237,8 +254,8 @@ impl Tongue {
                 (Position::Leaving(1.0), 1.0)
             }
             Position::Leaving(share) => {
-                let share =
-                    share - tick_s * speed * hardness / (1e-3 * f64::from(context.settings.tongue_ms));
+                let leaving_s = 1e-3 * f64::from(context.settings.tongue_ms) / hardness;
+                let share = share - tick_s * speed / leaving_s.min(OF_INTERVAL * self.interval_s);
                 if share > 0.0 { (Position::Leaving(share), share) } else { (Position::Away, 0.0) }
             }
             Position::Stopping(share) => {
