@@ -100,6 +100,12 @@ def warn(trials, table):
             f"{trial_names(stuck)}\n  the knob refused it (see the plugin's Knob status) or cannot take one; there the "
             "hand compared nothing"
         )
+    unarmed = sorted({(row["participant"], row["trial"]) for row in table if row["unarmed_s"] > 0})
+    if unarmed:
+        print(
+            f"WARNING: the knob was not armed for part of {len(unarmed)} of {len(trials)} trials (participant/trial): "
+            f"{trial_names(unarmed)}\n  this time is left out, see unarmed_s in summary.csv"
+        )
     still = sorted({(row["participant"], row["trial"]) for row in table if row["torque_peak_mnm"] == 0})
     if still:
         print(f"WARNING: no torque at all on a side, knob not armed? (participant/trial): {trial_names(still)}")

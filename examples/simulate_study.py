@@ -38,7 +38,7 @@ TRIALS = 16
 # Columns of a log.
 COLUMNS = (
     "t_us", "angle_deg", "velocity_deg_s", "torque_mnm", "written_midi", "gamma", "feel_id", "h", "k", "participant", "trial",
-    "side", "condition", "gamma_sounding", "level_db", "f0_hz", "heard_us",
+    "side", "condition", "gamma_sounding", "level_db", "f0_hz", "heard_us", "armed",
 )
 
 STEP_S = 0.01
@@ -146,7 +146,7 @@ def study(reeds_, seed, count, trembles=None, orders=None):
             who, trial, side, condition, offset_s + t_s[rows], angle[n, rows], -torque[n, rows], written[rows],
             gamma[n, rows], np.where(np.isfinite(written), gamma_on[n], np.nan)[rows],
             np.full(length, 1.0 + (condition == "free")), unknown[rows], unknown[rows], unknown[rows], h,
-            k_of(h, condition), True, True, 0,
+            k_of(h, condition), True, True, True, 0,
         )
         offset_s += length * STEP_S
         trials.setdefault((who, trial), []).append(piece)
@@ -244,7 +244,7 @@ def write_log(path, remark, pieces):
                 writer.writerow((
                     round(1e6 * t_s), cell(piece.angle_deg[row], 1), cell(velocity[row], 1), cell(piece.torque_mnm[row], 2),
                     cell(note, 0), cell(piece.gamma[row], 5), cell(piece.feel_id[row], 0), f"{piece.h:g}", f"{piece.k:.5f}",
-                    piece.participant, piece.trial, piece.side, piece.condition, cell(sounding, 5), "", "", "",
+                    piece.participant, piece.trial, piece.side, piece.condition, cell(sounding, 5), "", "", "", 1,
                 ))
 
 

@@ -13,7 +13,7 @@ WORDS = ("side", "condition")
 # These may be empty: no note is fingered, no study runs, or the reed is unknown.
 MAY_BE_EMPTY = ("written_midi", "feel_id", "h", "k", "participant", "trial")
 # Columns that older logs, and logs without sound, do not have.
-OPTIONAL = ("gamma_sounding", "level_db", "f0_hz", "heard_us")
+OPTIONAL = ("gamma_sounding", "level_db", "f0_hz", "heard_us", "armed")
 SIDES = ("A", "B")
 CONDITIONS = ("coupled", "free")
 
@@ -107,8 +107,10 @@ class Piece:
     k: float
     # True if the log says where its notes begin to sound.
     has_threshold: bool
-    # False if the piece only continues after a gap.
+    # False if the piece only continues after a gap, or after the knob was armed or let go.
     is_visit: bool
+    # False while the knob makes no torque: the hand then compares nothing. Older logs do not say, and count as armed.
+    is_armed: bool
     # Number of the log, so that times of two logs are never subtracted.
     log: int
 
@@ -139,7 +141,8 @@ def read_log(path, log, onset):
     t_s, heard_s = (1e-6 * (data[name] - data["t_us"][0]) for name in ("t_us", "heard_us"))
     key = [(p, n, s, c) for p, n, s, c in zip(data["participant"], data["trial"], words["side"], words["condition"])]
     changes = np.array([now != before for before, now in zip(key, key[1:])], dtype=bool)
-    cuts = np.flatnonzero(changes | (np.diff(t_s) > GAP_S)) + 1
+    armed = data["armed"] != 0
+    cuts = np.flatnonzero(changes | (np.diff(t_s) > GAP_S) | (armed[1:] != armed[:-1])) + 1
     pieces = []
     for begin, end in zip([0, *cuts], [*cuts, len(t_s)]):
         if not on[begin] or end - begin < 2:
@@ -156,7 +159,7 @@ def read_log(path, log, onset):
                 data["feel_id"][rows], data["level_db"][rows], data["f0_hz"][rows], heard_s[rows],
                 # Side and parameters do not change at exactly the same time, so the median of the rows counts.
                 float(np.median(h)), float(np.median(k)), bool(np.isfinite(sounding).any()),
-                begin == 0 or bool(changes[begin - 1]), log,
+                begin == 0 or bool(changes[begin - 1]), bool(armed[begin]), log,
             )
         )
     return pieces

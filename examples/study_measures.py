@@ -172,7 +172,6 @@ def row_of(own):
         "h": h,
         "k": k,
         "time_s": time_s,
-        "visits": sum(piece.is_visit for piece in own),
         "angle_rms_deg": median(found["angle_rms_deg"], HELD_WINDOWS),
         "held_windows": len(found["angle_rms_deg"]),
         "onset_s": median(onsets),
@@ -198,7 +197,8 @@ def summarise(trials, least_s):
     """One dictionary for each participant, trial and side."""
     table = []
     for (participant, trial), pieces in trials.items():
-        spent = {side: sum(integrals(p)[0] for p in pieces if p.side == side) for side in SIDES}
+        felt = [piece for piece in pieces if piece.is_armed]
+        spent = {side: sum(integrals(p)[0] for p in felt if p.side == side) for side in SIDES}
         tried = all(spent[side] >= least_s for side in SIDES)
         visits = [piece for piece in pieces if piece.is_visit]
         switches = sum(
@@ -206,9 +206,11 @@ def summarise(trials, least_s):
         )
         last, followed = pieces[-1], feel_followed(pieces)
         for side in SIDES:
-            own = [piece for piece in pieces if piece.side == side]
-            if not own:
+            both = [piece for piece in pieces if piece.side == side]
+            if not both:
                 continue
+            # A side that was never armed has measures of a hand that felt nothing; it is not compared.
+            own = [piece for piece in both if piece.is_armed] or both
             table.append(
                 {
                     "participant": participant,
@@ -216,6 +218,8 @@ def summarise(trials, least_s):
                     "side": side,
                     "condition": own[0].condition,
                     **row_of(own),
+                    "visits": sum(piece.is_visit for piece in both),
+                    "unarmed_s": sum(integrals(piece)[0] for piece in both if not piece.is_armed),
                     "switches": switches,
                     "last_side": last.side,
                     "last_condition": last.condition,

@@ -20,7 +20,7 @@ import study_questions  # noqa: E402
 SCRATCH = pathlib.Path(tempfile.mkdtemp())
 HEADER = (
     "t_us,angle_deg,velocity_deg_s,torque_mnm,written_midi,gamma,feel_id,h,k,participant,trial,side,condition,"
-    "gamma_sounding,level_db,f0_hz,heard_us"
+    "gamma_sounding,level_db,f0_hz,heard_us,armed"
 )
 
 RATE_HZ = 200
@@ -58,7 +58,7 @@ def visit(t_s, seconds, participant, trial, side, condition, h, hands):
         size = -torque if phase < 0.5 else -torque / 2
         rows.append(
             f"{round(1e6 * (t_s + t))},{angle:.3f},0.0,{size:.1f},{note},{gamma:.6f},{feel_id},{h:.5f},{k:.5f},"
-            f"{participant},{trial},{side},{condition},,{sound},{heard}"
+            f"{participant},{trial},{side},{condition},,{sound},{heard},1"
         )
     return rows
 
@@ -205,7 +205,7 @@ def the_hand_is_measured_in_degrees_and_seconds():
                 note = written if t >= 0.1 else ""
                 rows.append(
                     f"{round(1e6 * (t_s + t))},{angle:.4f},0,-40,{note},{gamma:.6f},1,2.0,0.4,1,1,{side},{condition},"
-                    f"{gamma_on},,,"
+                    f"{gamma_on},,,,"
                 )
             t_s += 2.0
     path = SCRATCH / "hand.csv"
@@ -227,7 +227,7 @@ def a_gap_and_a_glance_count_for_nothing():
     at = 2 + 2 * RATE_HZ
     # A second is missing in trial 1, and rows outside the study stand in front.
     kept = [line for n, line in enumerate(lines) if not at <= n < at + RATE_HZ]
-    kept[2:2] = ["4900000,0.00,0.0,0,,0.00000,1,2.59808,0.38490,,,,,,,,"] * 3
+    kept[2:2] = ["4900000,0.00,0.0,0,,0.00000,1,2.59808,0.38490,,,,,,,,,"] * 3
     path = SCRATCH / "gap.csv"
     path.write_text("\n".join(kept))
     out = SCRATCH / "gap"
@@ -238,6 +238,33 @@ def a_gap_and_a_glance_count_for_nothing():
     assert (first["visits"], first["onsets"], first["compared"]) == ("1", "1", "yes"), first
     assert [row["compared"] for row in table(out / "summary.csv")] == ["yes", "yes", "no", "no"]
     assert "3/2" in told.stdout, told.stdout
+
+
+def time_without_torque_counts_for_nothing():
+    """The knob lets go for two of the five seconds of B in trial 1, and is never armed on B in trial 2."""
+    plan = [(1, 2.0, "free", [("A", 5), ("B", 5)]), (2, 3.3, "free", [("A", 5), ("B", 5)])]
+    lines = log("armed.csv", 4, plan).read_text().splitlines()
+    torque = HEADER.split(",").index("torque_mnm")
+    rows = [n for n, line in enumerate(lines) if ",4,1," in line and ",B," in line]
+    free = set(rows[RATE_HZ : 3 * RATE_HZ]) | {n for n, line in enumerate(lines) if ",4,2," in line and ",B," in line}
+    for n, line in enumerate(lines[1:], 1):
+        cells = line.split(",")
+        cells[torque] = "0" if n in free else cells[torque]
+        cells[-1] = "0" if n in free else cells[-1]
+        lines[n] = ",".join(cells)
+    path, out = SCRATCH / "unarmed.csv", SCRATCH / "unarmed"
+    path.write_text("\n".join(lines))
+    told = analyse(path, "--out", out, "--no-timelines")
+    assert told.returncode == 0, told.stderr
+    assert "the knob was not armed for part of 2 of 2 trials (participant/trial): 4/1, 4/2\n" in told.stdout, told.stdout
+    assert "no torque at all on a side, knob not armed? (participant/trial): 4/2\n" in told.stdout, told.stdout
+    first, second = table(out / "summary.csv")[1], table(out / "summary.csv")[3]
+    near(first["time_s"], 3, 0.02, "time with torque")
+    near(first["unarmed_s"], 2, 0.02, "time without")
+    assert (first["visits"], first["compared"], second["compared"]) == ("1", "yes", "no"), (first, second)
+    whole = SCRATCH / "whole_armed"
+    assert analyse(SCRATCH / "armed.csv", "--out", whole, "--no-timelines").returncode == 0
+    near(first["torque_mean_mnm"], float(table(whole / "summary.csv")[1]["torque_mean_mnm"]), 0.3, "mean of what was felt")
 
 
 def a_feel_that_does_not_follow_is_told():
@@ -271,7 +298,7 @@ def notes_that_never_speak_are_counted():
         note = 60 + part % 3 if t % 0.5 > 0.1 else ""
         gamma = (0.2 if part % 2 else 0.45) * (t % 0.5 > 0.2)
         condition = "coupled" if side == "A" else "free"
-        rows.append(f"{round(1e6 * t)},0,0,0,{note},{gamma},1,2.0,0.4,1,1,{side},{condition},,,,")
+        rows.append(f"{round(1e6 * t)},0,0,0,{note},{gamma},1,2.0,0.4,1,1,{side},{condition},,,,,")
     path = SCRATCH / "silent.csv"
     path.write_text("\n".join(rows))
     told = analyse(path, "--out", SCRATCH / "silent", "--no-timelines")
@@ -362,7 +389,7 @@ def bad_files_are_named_with_the_place():
         ([changed("side.csv", 9, "side", "C")], "line 10: side is `C`"),
         ([changed("condition.csv", 9, "condition", "")], "line 10: condition is ``"),
         ([changed("trial.csv", 9, "trial", "")], "line 10: trial is empty"),
-        ([written("off.csv", f"{HEADER}\n0,1,0,0,60,0.5,1,2,0.4,,,,,,,,\n")], "no row belongs to a study"),
+        ([written("off.csv", f"{HEADER}\n0,1,0,0,60,0.5,1,2,0.4,,,,,,,,,\n")], "no row belongs to a study"),
         ([changed("heard.csv", 9, "f0_hz", "high")], "line 10: f0_hz is `high`"),
         ([good, good], "given twice"),
         ([good, other_seed], "two orders"),
@@ -405,6 +432,7 @@ TESTS = [
     persons_are_compared_and_not_their_trials,
     the_hand_is_measured_in_degrees_and_seconds,
     a_gap_and_a_glance_count_for_nothing,
+    time_without_torque_counts_for_nothing,
     a_feel_that_does_not_follow_is_told,
     notes_that_never_speak_are_counted,
     thresholds_follow_the_reed,

@@ -312,7 +312,9 @@ impl KnobCommand {
         let mut said = String::new();
         // The latest of a connected knob, whether it is lost now, and when it was.
         let (mut stats, mut is_lost, mut lost_s) = (LinkStats::default(), false, 0.0);
+        // Since when it is no longer armed although nobody has said so, and why.
         let mut was_armed = false;
+        let mut let_go = None;
         // Begins with the remarks on the feel, which the knob's limits decide.
         let mut take = None;
         // Positions from before the zero would be a breath that nobody blew.
@@ -341,6 +343,9 @@ impl KnobCommand {
             let status = link.status();
             let is_connected = matches!(status.phase, Phase::Live | Phase::ReadOnly);
             was_armed |= status.armed;
+            if was_armed && !status.armed && let_go.is_none() {
+                let_go = Some(began.elapsed().as_secs_f64());
+            }
             if is_connected {
                 (stats, is_lost) = (status.stats, false);
             } else if live_since.is_some() && !is_lost {
@@ -415,6 +420,14 @@ impl KnobCommand {
         if self.arm.is_some() && !was_armed {
             return Err(Failure::Usage("the knob was never armed, so it made no torque".to_owned()));
         }
+        let status = link.status();
+        if let Some(alarm) = status.alarm {
+            return Err(Failure::Usage(alarm));
+        }
+        if let Some(seconds) = let_go {
+            let why = status.notice.unwrap_or(status.text);
+            return Err(Failure::Usage(format!("the knob was no longer armed after {seconds:.1} s: {why}")));
+        }
         Ok(())
     }
 }
@@ -474,6 +487,7 @@ fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) 
         written: Some(note.written.0),
         gamma,
         feel_id: state.feel_id,
+        armed: state.armed(),
     };
     let reed = Some((f64::from(note.feel.h), f64::from(note.feel.k)));
     let sounds_from = note.requirement.map(|required| required.gamma_sounding);

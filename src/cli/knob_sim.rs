@@ -20,6 +20,7 @@ use chalumeau_knob::simulator::serve::{Port, Server};
 use chalumeau_knob::wire::TorqueLaw;
 use clap::Args;
 use std::fs::File;
+use std::hash::{BuildHasher, RandomState};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -232,6 +233,8 @@ impl KnobSimCommand {
                 midi: self.port.midi.is_some(),
                 knob_damping_nms: plant.viscous_nms as f32,
                 counts_per_turn: plant.counts_per_turn,
+                // Whatever the seed: a recorded permission must not fit the next start.
+                epoch: RandomState::new().hash_one(()) as u16,
                 ..Setup::default()
             };
             (SimulatedKnob::new(setup, plant, hand, self.seed), self.port.open()?)

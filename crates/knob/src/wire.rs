@@ -16,7 +16,7 @@ pub use frame::{Decoder, EncodedFrame, FrameError, WireStats, encode};
 pub use limits::{FieldRange, OutOfRange};
 pub use message::{
     Arm, Capabilities, Counters, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, Stamp,
-    TorqueLaw, UNDATED_CEILING_MNM,
+    TorqueLaw, UNCALIBRATED_CEILING_MNM, UNDATED_CEILING_MNM,
 };
 
 /// Version of the protocol spoken here: another major one is never armed.

@@ -7,7 +7,7 @@ mod misbehaving_knobs;
 
 use chalumeau_knob::device::session::{HostSession, SessionEvent, SessionOutput};
 use chalumeau_knob::device::transport::Binding;
-use chalumeau_knob::wire::{Feel, Message, TorqueLaw, UNDATED_CEILING_MNM};
+use chalumeau_knob::wire::{Feel, Message, TorqueLaw, UNCALIBRATED_CEILING_MNM, UNDATED_CEILING_MNM};
 use misbehaving_knobs::{FakeKnob, Misbehaving, all};
 
 /// Session and knob on a line without delay; the user arms after a second and asks for 100 mNm.
@@ -132,8 +132,18 @@ fn a_knob_that_jumps_again_and_again_is_disarmed_for_good_and_says_why() {
 
 #[test]
 fn a_knob_of_version_1_0_is_asked_for_50_mnm_at_most() {
-    let older = *all().iter().find(|kind| kind.name == "TTLink 1.0").unwrap();
-    let mut course = Course::new(older);
+    is_asked_for("TTLink 1.0", UNDATED_CEILING_MNM);
+}
+
+#[test]
+fn a_knob_that_is_not_calibrated_is_asked_for_50_mnm_at_most_whatever_it_declares() {
+    is_asked_for("not calibrated", UNCALIBRATED_CEILING_MNM);
+}
+
+/// A knob that declares 450 mNm is armed with at most so much where the user allows 250.
+fn is_asked_for(name: &str, most_mnm: u16) {
+    let kind = *all().iter().find(|kind| kind.name == name).unwrap();
+    let mut course = Course::new(kind);
     course.run(1_000);
     course.session.arm(250, true, 1_000_000);
     course.run(1_000);
@@ -142,6 +152,6 @@ fn a_knob_of_version_1_0_is_asked_for_50_mnm_at_most() {
         Message::Arm(arm) => Some(arm.ceiling_mnm),
         _ => None,
     });
-    assert_eq!(ceilings.collect::<Vec<_>>(), [UNDATED_CEILING_MNM]);
-    assert_eq!(course.session.info().unwrap().torque_limits(250).ceiling_mnm, 50.0);
+    assert_eq!(ceilings.collect::<Vec<_>>(), [most_mnm]);
+    assert_eq!(course.session.info().unwrap().torque_limits(250).ceiling_mnm, f64::from(most_mnm));
 }

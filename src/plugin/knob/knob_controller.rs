@@ -189,6 +189,7 @@ impl KnobController {
                     .map(|WrittenNote(written)| written),
                 gamma: shared.blown().map_or(0.0, |feel| feel.gamma(shared.note(), shared.breath())),
                 feel_id: state.feel_id,
+                armed: state.armed(),
             });
         };
         Hooks { feel: Box::new(feel), on_state: Box::new(on_state) }

@@ -83,6 +83,13 @@ pub struct StateSample {
     pub period_us: u32,
 }
 
+impl StateSample {
+    /// Whether the knob may make torque; `None` where it does not say what torque it makes.
+    pub fn armed(&self) -> Option<bool> {
+        self.torque_mnm.map(|_| wire::Flags(self.flags).armed())
+    }
+}
+
 /// What a session reports to its caller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SessionEvent {
@@ -297,7 +304,16 @@ impl HostSession {
 
     /// What limits the torque of a knob whose firmware is of TTLink 1.0.
     pub fn restriction(&self) -> Option<String> {
-        let info = self.info.as_ref().filter(|info| info.speaks_our_major() && !info.checks_age())?;
+        let info = self.info.as_ref().filter(|info| info.speaks_our_major())?;
+        if info.checks_age() {
+            return (!info.is_calibrated()).then(|| {
+                format!(
+                    "this knob is not calibrated, so that nobody knows what torque it makes: at most {} mNm; \
+                     firmware/README.md, Calibrate it",
+                    info.most_mnm()
+                )
+            });
+        }
         Some(format!(
             "this knob's firmware speaks TTLink {}.{} and cannot tell a late command from a new one: at most {} mNm; flash \
              the firmware in firmware/ for more",

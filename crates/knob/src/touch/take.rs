@@ -25,6 +25,8 @@ pub struct TakeRow {
     pub gamma: f64,
     /// Feel in force.
     pub feel_id: u8,
+    /// Whether the knob may make torque, if it says so.
+    pub armed: Option<bool>,
 }
 
 /// What a row belongs to. Only analyses need it; a replay does not read it.

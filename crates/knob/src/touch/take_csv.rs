@@ -11,7 +11,7 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 
 /// Column names in the order they are written.
 pub const HEADER: &str = "t_us,angle_deg,velocity_deg_s,torque_mnm,written_midi,gamma,feel_id,h,k,\
-                          participant,trial,side,condition,gamma_sounding,level_db,f0_hz,heard_us";
+                          participant,trial,side,condition,gamma_sounding,level_db,f0_hz,heard_us,armed";
 /// Rows a file may have: ten hours at 500 a second.
 const MOST_ROWS: usize = 18_000_000;
 /// Largest angle that makes sense, degrees: a hundred turns.
@@ -198,6 +198,7 @@ struct Columns {
     feel_id: Column,
     h: Column,
     k: Column,
+    armed: Column,
 }
 
 impl Columns {
@@ -219,6 +220,7 @@ impl Columns {
             feel_id: column("feel_id"),
             h: column("h"),
             k: column("k"),
+            armed: column("armed"),
         })
     }
 
@@ -255,6 +257,12 @@ impl Columns {
             written: small(self.written)?,
             gamma: measured(self.gamma)?,
             feel_id: small(self.feel_id)?.unwrap_or(0),
+            armed: match cell(record, self.armed) {
+                "" => None,
+                "0" => Some(false),
+                "1" => Some(true),
+                _ => return Err(refuse(record, self.armed, "0 or 1, or empty")),
+            },
         })
     }
 }
@@ -302,7 +310,7 @@ impl<W: Write> TakeWriter<W> {
 
     /// Writes one row. Errors are those of the output.
     pub fn write(&mut self, row: &TakeRow, marks: &TakeMarks) -> io::Result<()> {
-        let TakeRow { t_us, angle_deg, velocity_deg_s, torque_mnm, written, gamma, feel_id } = *row;
+        let TakeRow { t_us, angle_deg, velocity_deg_s, torque_mnm, written, gamma, feel_id, armed } = *row;
         let written = written.map_or_else(String::new, |written| written.to_string());
         let torque_mnm = torque_mnm.map_or_else(String::new, |mnm| format!("{mnm:.0}"));
         write!(
@@ -329,10 +337,11 @@ impl<W: Write> TakeWriter<W> {
         let onset_us = marks.heard.onset_us.map_or_else(String::new, |t_us| t_us.to_string());
         writeln!(
             self.out,
-            "{},{},{},{onset_us}",
+            "{},{},{},{onset_us},{}",
             cell(marks.sounds_from, 5),
             cell(marks.heard.level_db, 1),
-            cell(marks.heard.f0_hz, 2)
+            cell(marks.heard.f0_hz, 2),
+            armed.map_or("", |armed| if armed { "1" } else { "0" })
         )
     }
 
@@ -368,6 +377,7 @@ mod tests {
                 written: (n > 10).then_some(60),
                 gamma: 0.5,
                 feel_id: n as u8,
+                armed: (n > 5).then_some(n > 20),
             })
             .collect();
         let mut writer = TakeWriter::new(Vec::new(), &["participant\n7".to_owned()]).unwrap();

@@ -3,6 +3,7 @@
 use crate::wire::codes::{FaultCode, RefusedCode};
 use crate::wire::plain_text::plain;
 use chalumeau_core::haptics::TorqueLimits;
+use chalumeau_core::haptics::feel_parameters::HARD_CEILING_MNM;
 pub use chalumeau_core::haptics::{Feel, TorqueLaw};
 
 /// What a permission answers: it dates ARM and ALIVE by the knob's own clock, so that the knob can refuse an old one.
@@ -100,6 +101,9 @@ pub struct Info {
 /// Most torque that a device of TTLink 1.0 is asked for, mNm: it cannot tell an old permission from a new one, so that a
 /// late or repeated ARM may arm it. A finger holds this much (judgement).
 pub const UNDATED_CEILING_MNM: u16 = 50;
+/// Most torque that a device is asked for whose motor nobody has measured, mNm: it may make twice as much as it says. Such a device declares no
+/// more by itself; this is for one that does.
+pub const UNCALIBRATED_CEILING_MNM: u16 = 50;
 
 impl Info {
     /// A name as INFO carries it: cut at the last whole character that fits 16 bytes.
@@ -124,7 +128,14 @@ impl Info {
 
     /// Most torque that this device may be asked for, mNm.
     pub fn most_mnm(&self) -> u16 {
-        if self.checks_age() { self.ceiling_mnm } else { self.ceiling_mnm.min(UNDATED_CEILING_MNM) }
+        let dated_mnm = if self.checks_age() { HARD_CEILING_MNM } else { UNDATED_CEILING_MNM };
+        let calibrated_mnm = if self.is_calibrated() { HARD_CEILING_MNM } else { UNCALIBRATED_CEILING_MNM };
+        self.ceiling_mnm.min(dated_mnm).min(calibrated_mnm)
+    }
+
+    /// Whether somebody has measured the motor: its signs, its damping and its torque per count.
+    pub fn is_calibrated(&self) -> bool {
+        self.capabilities.has(Capabilities::CALIBRATED)
     }
 
     /// The limits a feel must keep on this device, under a ceiling of `allowed_mnm` that the user allows.

@@ -77,6 +77,13 @@ pub fn all() -> Vec<Misbehaving> {
         info("a ceiling of nothing", "ceiling of 0 mNm", |info, _| info.ceiling_mnm = 0),
         info("a ceiling of 65 N m", "ceiling of 65535 mNm", |info, _| info.ceiling_mnm = 65_535),
         info("no motor", "has no motor", |info, _| info.capabilities.0 &= !Capabilities::MOTOR),
+        Misbehaving {
+            may_arm: true,
+            doctor: "not calibrated",
+            ..info("not calibrated", "not calibrated", |info, _| {
+                info.capabilities.0 &= !Capabilities::CALIBRATED
+            })
+        },
         info("a loop of 100 Hz", "at 100 Hz", |info, _| info.loop_hz = 100),
         info("no loop", "at 0 Hz", |info, _| info.loop_hz = 0),
         info("no encoder", "0 counts a turn", |info, _| info.counts_per_turn = 0),
@@ -275,7 +282,9 @@ fn honest_info(moment: Moment) -> Info {
     Info {
         major: 1,
         minor: 1,
-        capabilities: Capabilities(Capabilities::FLOW | Capabilities::PRESSURE | Capabilities::MOTOR),
+        capabilities: Capabilities(
+            Capabilities::FLOW | Capabilities::PRESSURE | Capabilities::MOTOR | Capabilities::CALIBRATED,
+        ),
         firmware: (9, 9, 9),
         name: Info::name_bytes("Honest"),
         serial: 0xBAD0 + u64::from(moment.armed_ms.is_some()),

@@ -215,7 +215,7 @@ pub(super) mod tests {
         Info {
             major: 1,
             minor: 1,
-            capabilities: Capabilities(Capabilities::FLOW),
+            capabilities: Capabilities(Capabilities::FLOW | Capabilities::CALIBRATED),
             firmware: (0, 1, 0),
             name: Info::name_bytes("TorqueTuner"),
             serial: 0xC1A2,
