@@ -56,17 +56,55 @@ pub const BEGINNING_S: f64 = 0.5;
 /// Time over which the level after the beginning is averaged, s: several periods of the lowest note.
 const WINDOW_S: f64 = 0.05;
 
-/// A WAV file that is being written.
-pub struct WavFile<W: Write + Seek> {
-    writer: WavWriter<BufWriter<W>>,
-    depth: Depth,
-    channels: u16,
+/// Measures the level of samples on their way.
+pub struct LevelMeter {
     level: Levels,
     /// Sum of the squares, and how many.
     power: (f64, u64),
     /// The same for the window that goes on, which begins after the beginning.
     window: (f64, u64),
-    rate: u32,
+    /// Samples of all channels in a second.
+    in_one_s: f64,
+}
+
+impl LevelMeter {
+    /// For `channels` channels at `rate` Hz.
+    pub fn new(rate: u32, channels: u16) -> Self {
+        let in_one_s = f64::from(rate) * f64::from(channels);
+        Self { level: Levels::default(), power: (0.0, 0), window: (0.0, 0), in_one_s }
+    }
+
+    /// Hears the next sample: of each moment that of every channel.
+    pub fn hear(&mut self, sample: f32) {
+        self.level.peak = self.level.peak.max(sample.abs());
+        let square = f64::from(sample).powi(2);
+        self.power = (self.power.0 + square, self.power.1 + 1);
+        if (self.power.1 as f64) <= BEGINNING_S * self.in_one_s {
+            return;
+        }
+        self.window = (self.window.0 + square, self.window.1 + 1);
+        if self.window.1 as f64 >= WINDOW_S * self.in_one_s {
+            let rms = (self.window.0 / self.window.1 as f64).sqrt() as f32;
+            self.level.after_beginning =
+                Some(self.level.after_beginning.map_or(rms, |loudest| loudest.max(rms)));
+            self.window = (0.0, 0);
+        }
+    }
+
+    /// Levels until now.
+    pub fn levels(&self) -> Levels {
+        Levels { rms: (self.power.0 / self.power.1.max(1) as f64).sqrt() as f32, ..self.level }
+    }
+}
+
+/// A WAV file that is being written.
+pub struct WavFile<W: Write + Seek> {
+    writer: WavWriter<BufWriter<W>>,
+    depth: Depth,
+    channels: u16,
+    meter: LevelMeter,
+    /// Samples clipped.
+    clipped: u64,
 }
 
 impl<W: Write + Seek> WavFile<W> {
@@ -86,15 +124,7 @@ impl<W: Write + Seek> WavFile<W> {
         }
         let spec = WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format };
         let writer = WavWriter::new(BufWriter::new(file), spec)?;
-        Ok(Self {
-            writer,
-            depth,
-            channels,
-            level: Levels::default(),
-            power: (0.0, 0),
-            window: (0.0, 0),
-            rate,
-        })
+        Ok(Self { writer, depth, channels, meter: LevelMeter::new(rate, channels), clipped: 0 })
     }
 
     /// Appends one block: a mono sound, which goes to every channel, or the channels.
@@ -102,41 +132,22 @@ impl<W: Write + Seek> WavFile<W> {
         for (at, &first) in block.first().into_iter().flat_map(|first| first.iter()).enumerate() {
             for channel in 0..usize::from(self.channels) {
                 let sample = block.get(channel).map_or(first, |samples| samples[at]);
-                self.level.peak = self.level.peak.max(sample.abs());
-                let square = f64::from(sample).powi(2);
-                self.power = (self.power.0 + square, self.power.1 + 1);
-                self.look_after_beginning(square);
+                self.meter.hear(sample);
                 match self.depth {
                     Depth::Int16 => self.writer.write_sample(round(sample, 32_767.0))?,
                     Depth::Int24 => self.writer.write_sample(round(sample, 8_388_607.0))?,
                     Depth::Float32 => self.writer.write_sample(sample)?,
                 }
-                self.level.clipped += u64::from(self.depth != Depth::Float32 && sample.abs() > 1.0);
+                self.clipped += u64::from(self.depth != Depth::Float32 && sample.abs() > 1.0);
             }
         }
         Ok(())
     }
 
-    /// Takes in the square of a sample.
-    fn look_after_beginning(&mut self, square: f64) {
-        let in_one_s = f64::from(self.rate) * f64::from(self.channels);
-        if (self.power.1 as f64) <= BEGINNING_S * in_one_s {
-            return;
-        }
-        self.window = (self.window.0 + square, self.window.1 + 1);
-        if self.window.1 as f64 >= WINDOW_S * in_one_s {
-            let rms = (self.window.0 / self.window.1 as f64).sqrt() as f32;
-            self.level.after_beginning =
-                Some(self.level.after_beginning.map_or(rms, |loudest| loudest.max(rms)));
-            self.window = (0.0, 0);
-        }
-    }
-
     /// Completes the header.
     pub fn finish(self) -> Result<Levels, WavError> {
         self.writer.finalize()?;
-        let rms = (self.power.0 / self.power.1.max(1) as f64).sqrt() as f32;
-        Ok(Levels { rms, ..self.level })
+        Ok(Levels { clipped: self.clipped, ..self.meter.levels() })
     }
 }
 

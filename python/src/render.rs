@@ -3,6 +3,7 @@
 use crate::instrument::Instrument;
 use crate::mistakes::{advised, signals, watched, wrong};
 use chalumeau::cli::offline::{self, Given, TimedNote};
+use chalumeau::wav::LevelMeter;
 use chalumeau_core::units::SoundingNote;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyMemoryError;
@@ -67,10 +68,14 @@ pub fn render<'py>(
         }
         let mut samples = memory(job.score.samples.saturating_mul(usize::from(channels)), false)?;
         let mut unheard = 0;
+        let mut meter = LevelMeter::new(job.rate, channels);
         let resets = job.play(channels, None, |sent, heard| {
             match heard {
-                [mono] => samples.extend_from_slice(mono),
-                [left, right] => samples.extend(left.iter().zip(*right).flat_map(|(l, r)| [*l, *r])),
+                [mono] => samples.extend(mono.iter().inspect(|sample| meter.hear(**sample))),
+                [left, right] => {
+                    let both = left.iter().zip(*right).flat_map(|(l, r)| [*l, *r]);
+                    samples.extend(both.inspect(|sample| meter.hear(*sample)));
+                }
                 _ => {}
             }
             // Once for each second of sound: Ctrl-C ends a long rendering.
@@ -81,6 +86,7 @@ pub fn render<'py>(
             }
             Ok(())
         })?;
+        warnings.extend(offline::doubts(&job, meter.levels()).map(str::to_owned));
         let spans = job.score.note_spans(&job.settings.reach.key_notes(&job.model));
         let longest = spans.iter().max_by_key(|span| span.to - span.from);
         let wanted_hz =

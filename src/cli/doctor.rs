@@ -141,7 +141,8 @@ impl DoctorCommand {
             )?,
         }
         tell_link(out, &status)?;
-        Ok(if status.phase == Phase::Live { Answer::Live } else { Answer::None })
+        let is_ours = matches!(status.phase, Phase::Live | Phase::VersionMismatch);
+        Ok(if is_ours { Answer::Live } else { Answer::None })
     }
 
     fn ask_osc(&self, out: &mut impl Write, port: u16) -> io::Result<bool> {
@@ -202,7 +203,7 @@ const SIMULATOR: &str = if cfg!(unix) {
 /// What a port has answered.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Answer {
-    /// A knob with this project's firmware.
+    /// A knob with this project's firmware, of whatever version.
     Live,
     /// Another program has it.
     InUse,

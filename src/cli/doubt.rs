@@ -60,7 +60,7 @@ impl Doubt {
     pub fn text(self) -> &'static str {
         match self {
             Self::Clipped => "samples clipped: lower the gain, or write floats of 32 bits, which do not clip",
-            Self::Limited => "the limiter turned peaks down; lower the gain for levels as played",
+            Self::Limited => "the limiter turned peaks down; for levels as played, lower the gain (gain-db)",
             Self::Reset => "the calculation broke down and the instrument was reset; please report this",
             Self::NoTone => {
                 "no tone is heard, or none after 0.5 s: the breath is too weak for the note, or so strong that the reed stays shut, or the key is silent, or the volume is 0"

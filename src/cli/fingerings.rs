@@ -108,7 +108,11 @@ impl FingeringsCommand {
         let Some(note) = self.note.map(WrittenNote) else {
             let mut table = self.table.open("fingers,low_hz,high_hz,uneven_db,gamma_on,cost,open")?;
             table.comment(format_args!("{looked}"))?;
-            for one in finder.multiphonics(count) {
+            let found = finder.multiphonics(count);
+            if found.is_empty() {
+                say!("note: none of the {} has two pitches", counted(finder.len(), "fingering"));
+            }
+            for one in found {
                 let [low, high] = one.f_hz;
                 table.line(format_args!(
                     "{},{low:.1},{high:.1},{:.1},{:.3},{:.2},{}",

@@ -341,7 +341,8 @@ impl KnobCommand {
                 break;
             }
             let status = link.status();
-            let is_connected = matches!(status.phase, Phase::Live | Phase::ReadOnly);
+            let is_watched = status.phase == Phase::VersionMismatch && self.arm.is_none();
+            let is_connected = is_watched || matches!(status.phase, Phase::Live | Phase::ReadOnly);
             was_armed |= status.armed;
             if was_armed && !status.armed && let_go.is_none() {
                 let_go = Some(began.elapsed().as_secs_f64());

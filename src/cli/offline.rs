@@ -5,12 +5,15 @@
 
 use crate::cli::batch::plan::Plan;
 use crate::cli::bifurcation::refuse_silent;
+use crate::cli::doubt::Doubt;
 use crate::cli::haptic::{FeltReedArgs, ReedInAirArgs};
 use crate::cli::parse;
+use crate::cli::render::is_held_beyond;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, rate, sounding};
 use crate::cli::silent_keys::silent_keys;
 use crate::cli::words::Names;
+use crate::wav::{BEGINNING_S, Levels};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelTable, PlayedReed, RequirementSolver};
 use chalumeau_core::instrument::{Model, Settings};
@@ -23,6 +26,11 @@ pub use crate::cli::render_job::RenderJob;
 pub use crate::cli::score_args::{Given, TimedNote};
 use crate::cli::score_args::{ScoreArgs, preset_called};
 pub use crate::cli::shared_args::{Stop, note};
+
+/// Why what such a job played, at these levels, may not be what was asked for: the warnings of `chalumeau render`.
+pub fn doubts(job: &RenderJob, level: Levels) -> impl Iterator<Item = &'static str> {
+    Doubt::all(level, 0, is_held_beyond(job, BEGINNING_S)).map(Doubt::text)
+}
 
 /// Names and their values.
 pub type Pairs = [(String, String)];

@@ -67,7 +67,7 @@ pub struct RealismCommand {
     #[arg(long, value_name = "HZ,DB", value_parser = shelf)]
     shelf: Option<Shelf>,
     /// How often to play each note, 1..16: takes differ in breath noise and Life, as those of a player do
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=16))]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = |s: &str| s.parse::<u8>().ok().filter(|takes| (1..=16).contains(takes)).ok_or("must be a whole number in 1..16"))]
     takes: u8,
     /// Play a preset; other flags and --set change it
     #[arg(long, value_name = "NAME", value_parser = preset_called)]

@@ -314,7 +314,7 @@ impl ProbeTable {
         ))?;
         // With these a reader puts the columns on the axes of the reed law.
         table.comment(format_args!(
-            "closing pressure {} Pa, reference pressure {P_REF_PA} Pa, zeta {}, Zc {:.6e} Pa s/m3",
+            "closing pressure {:.2} Pa, reference pressure {P_REF_PA} Pa, zeta {}, Zc {:.6e} Pa s/m3",
             prepared.settings.closing_pa(),
             prepared.settings.zeta,
             prepared.model.air.z_c(prepared.model.file.nominal_radius_m)

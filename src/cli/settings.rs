@@ -91,7 +91,7 @@ impl NumberFlags {
         let range =
             if is_share(&number) { format!("{min}..{max} or {}", number.range()) } else { number.range() };
         let worked_out = WORKED_OUT.iter().find(|(id, _)| *id == parameter.id);
-        let default = worked_out.map_or_else(|| default.to_string(), |(_, text)| (*text).to_owned());
+        let default = worked_out.map_or_else(|| rounded(default), |(_, text)| (*text).to_owned());
         let value_name = match parameter.unit() {
             "kPa" => "KPA",
             "ms" => "MS",
@@ -107,6 +107,11 @@ impl NumberFlags {
             .action(ArgAction::Set)
             .value_parser(move |text: &str| flag_value(&number, text))
     }
+}
+
+/// A default as a reader needs it: the end of *Breath softest* is 4 of 127.
+fn rounded(default: f32) -> String {
+    ((1e4 * f64::from(default)).round() / 1e4).to_string()
 }
 
 /// Whether a flag takes it as a share, and texts show it as a percentage.
@@ -136,7 +141,8 @@ fn flag_value(number: &Number, text: &str) -> Result<f32, String> {
 fn doubtful(id: &str, parameter: &Parameter, text: &str) -> Result<(), String> {
     match (parameter.kind, text.trim().parse::<f32>()) {
         (Kind::Number(number), Ok(value)) if is_share(&number) && value > 0.0 && value <= 1.0 => {
-            let percent = number.scale * value;
+            // Single precision has no 30 % of its own.
+            let percent = (1e3 * number.scale * value).round() / 1e3;
             Err(format!(
                 "{id}={value} may mean {value} % or {percent} %: write {id}={value}% or {id}={percent}%"
             ))

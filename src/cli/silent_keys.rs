@@ -56,8 +56,12 @@ pub fn never_heard(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> 
     hands.iter_mut().for_each(Hand::hear);
     hidden += hands.iter().map(|hand| hand.unheard.len()).sum::<usize>();
     let notes = |count: usize| if count == 1 { "1 note is".to_owned() } else { format!("{count} notes are") };
-    let brief =
-        (brief > 0).then(|| format!("{} never heard: no time lies between beginning and end", notes(brief)));
+    let brief = (brief > 0).then(|| {
+        format!(
+            "{} no more than a moment long: beginning and end lie at the same time (a note without an end ends with the file)",
+            notes(brief)
+        )
+    });
     let hidden = (hidden > 0).then(|| {
         format!(
             "{} never heard: another begins in the same moment and lasts as long. A clarinet plays one note at a time, of a chord the last in the file; --players 2 or more play chords",

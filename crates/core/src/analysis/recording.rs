@@ -27,6 +27,12 @@ const ENVELOPE_S: f64 = 0.02;
 const STEP_S: f64 = 0.001;
 /// How far before and after a dip the level must be back, s: that of quick tonguing (by judgement).
 const AROUND_S: f64 = 0.15;
+/// What a note begins with is over after this time, s, and has less of its seeming fundamental than this, dB re the strongest harmonic. Of
+/// chromatic scales over the whole compass, in which the attacks of some of the highest notes read as notes two octaves lower for 0.05 to 0.07 s,
+/// these fundamentals lie 13 to 24 dB down (by judgement).
+const ATTACK_S: f64 = 0.1;
+/// See [`ATTACK_S`].
+const NO_FUNDAMENTAL_DB: f64 = -10.0;
 /// A dip below this share of the level on both sides is the tongue's: -8 dB, deeper than a vibrato's (by judgement).
 const DIP: f64 = 0.4;
 /// A note begins and ends at this share of its steady level, as in [`onset::attack_s`]; over noise, at twice the level beside it and at
@@ -96,7 +102,9 @@ pub fn notes(samples: &[f64], rate_hz: f64) -> (Vec<Note>, Vec<TrackPoint>) {
         let after_s = notes.last().map_or(0.0, |note| note.end_s);
         let before_s = parts.get(at + 1).map_or(f64::INFINITY, |next| 0.5 * (part.to_s + next.from_s));
         let within = part.edges(samples, rate_hz, &envelope, (after_s, before_s));
-        notes.extend(measured(samples, rate_hz, within, part.hz));
+        let found = measured(samples, rate_hz, within, part.hz);
+        let next = parts.get(at + 1);
+        notes.extend(found.filter(|note| !next.is_some_and(|next| part.begins(next, note))));
     }
     (notes, track)
 }
@@ -223,6 +231,15 @@ fn tongued(parts: impl Iterator<Item = Part>, envelope: &Envelope) -> Vec<Part> 
 }
 
 impl Part {
+    /// Whether this is no note, but how a higher one begins: partials that are in no harmonic ratio have a common period which nothing
+    /// sounds, and which ends with the attack.
+    fn begins(&self, next: &Self, measured: &Note) -> bool {
+        let goes_on = next.from_s - self.to_s <= (GAP + 1) as f64 * HOP_S;
+        let is_brief = self.to_s - self.from_s < ATTACK_S;
+        let lacks_fundamental = measured.levels_db.first().is_some_and(|&db| db < NO_FUNDAMENTAL_DB);
+        goes_on && is_brief && lacks_fundamental && cents(next.hz, self.hz) > 1_200.0 - APART_CENTS
+    }
+
     /// Where the sound of this note begins and ends, s, between its neighbours: through windows of one period.
     fn edges(
         &self,
@@ -324,6 +341,18 @@ mod tests {
         let (found, _) = notes(&vibrato, RATE_HZ);
         assert_eq!(found.len(), 1, "{found:#?}");
         assert!(cents(found[0].f0_hz, 220.0).abs() < 3.0, "{found:?}");
+    }
+
+    /// Two octaves below for 0.07 s, as the attacks of high notes sound, and as a grace note does.
+    #[test]
+    fn what_lacks_its_fundamental_is_the_beginning_of_the_next_note() {
+        for (fundamental_db, count) in [(-15.0, 1), (0.0, 2)] {
+            let mut samples = tone(311.0, RATE_HZ, 0.07, &[fundamental_db, -50.0, -17.0, 0.0]);
+            samples.extend(tone(1_244.0, RATE_HZ, 0.4, &CLARINET_DB));
+            let (found, _) = notes(&samples, RATE_HZ);
+            assert_eq!(found.len(), count, "{fundamental_db} dB: {found:#?}");
+            assert!(cents(found[count - 1].f0_hz, 1_244.0).abs() < 1.0);
+        }
     }
 
     /// A touch of the period twice as long, as when the note before dies away.

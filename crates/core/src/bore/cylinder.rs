@@ -90,7 +90,8 @@ pub enum CylinderError {
     },
     /// Holes that would run into each other.
     #[error(
-        "the holes of {first} and {second} would overlap, {apart_mm:.1} mm apart; make them smaller, the chimneys shorter or the steps wider"
+        "the holes of {first} and {second} would overlap, with centres {:.1} mm apart; make the chimneys shorter, or leave out one of the two notes",
+        .apart_mm.max(0.0)
     )]
     Overlap {
         /// The lower note.
