@@ -310,8 +310,9 @@ mod tests {
         assert_eq!(plain(translator.translate(&tuning, false)), [Event::Bend { cents: 150.0 }]);
         let note = Host::NoteOn { timing: 7, voice_id, channel, key, velocity: 1.0 };
         let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 1.0 };
-        assert_eq!(plain(translator.translate(&note, false)), [Event::Bend { cents: 200.0 }, note_on]);
-        assert_eq!(plain(translator.translate(&note, false)), [note_on]);
+        let up = Event::NoteOff { note: SoundingNote(60) };
+        assert_eq!(plain(translator.translate(&note, false)), [Event::Bend { cents: 200.0 }, up, note_on]);
+        assert_eq!(plain(translator.translate(&note, false)), [up, note_on]);
     }
 
     #[test]

@@ -400,6 +400,7 @@ mod tests {
         ends.swap.receive();
         for _ in 0..100 {
             ends.swap.render_events([], Channels::one(&mut out[..480]));
+            ends.swap.receive();
             assert!(!ends.swap.is_silent() || ends.back.pop().is_ok());
             if ends.swap.is_silent() {
                 return;
