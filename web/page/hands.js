@@ -20,14 +20,18 @@ export class Hands {
   /** `who` holds the key: a letter, a pointer, a MIDI input. */
   press(note, velocity, who, channel = 0) {
     const key = keyOf(note, channel);
-    const holders = this.held.get(key)?.holders ?? new Set();
+    const before = this.held.get(key);
+    const holders = before?.holders ?? new Set();
     holders.add(who);
     this.held.delete(key);
     this.held.set(key, { note, channel, holders });
-    this.send({ midi: [0x90 | channel, note, velocity] });
     const { fingered } = this;
     this.fingered = null;
-    if (fingered && keyOf(fingered.note, fingered.channel) !== key) this.end(fingered);
+    // The instrument counts how often a key goes down and comes up.
+    if (before) this.end({ note, channel });
+    const isFingered = fingered !== null && keyOf(fingered.note, fingered.channel) === key;
+    if (!isFingered) this.send({ midi: [0x90 | channel, note, velocity] });
+    if (fingered && !isFingered) this.end(fingered);
   }
 
   release(note, who, channel = 0) {

@@ -192,13 +192,13 @@ pub fn all() -> Vec<Misbehaving> {
             })
         },
         Misbehaving {
-            doctor: "jumped by",
+            doctor: "has jumped",
             ..state("leaps of 21 million degrees", "jumped by", |state, moment| {
                 state.angle = if moment.ms % 1_000 < 500 { i32::MAX } else { i32::MIN };
             })
         },
         Misbehaving {
-            doctor: "jumped by",
+            doctor: "has jumped",
             ..state("an angle of noise", "jumped by", |state, moment| {
                 state.angle = (moment.ms.wrapping_mul(2_654_435_761) >> 8) as i32;
             })
