@@ -312,8 +312,8 @@ impl KnobCommand {
         let mut said = String::new();
         // The latest of a connected knob, whether it is lost now, and when it was.
         let (mut stats, mut is_lost, mut lost_s) = (LinkStats::default(), false, 0.0);
-        // Since when it is no longer armed although nobody has said so, and why.
         let mut was_armed = false;
+        // When it let go by itself, s.
         let mut let_go = None;
         // Begins with the remarks on the feel, which the knob's limits decide.
         let mut take = None;

@@ -155,6 +155,19 @@ fn who_plays_quickly_tongues_quickly() {
     assert!(softer[1..].iter().all(|&db| db < 3.0), "{softer:.1?}");
 }
 
+/// No time lies between the two notes.
+#[test]
+fn a_key_that_is_struck_twice_in_one_moment_sounds_as_one() {
+    for attack in [Attack::Soft, Attack::Normal, Attack::Hard] {
+        let settings = Settings { attack, ..still() };
+        let twice = [key(0.1, 60), release(0.1, 60), key(0.1, 60)];
+        let sound = rendered(&settings, &twice, 0.6);
+        let once = rendered(&settings, &[key(0.1, 60)], 0.6);
+        let held = |sound: &[f64]| level_db(&sound[sample(0.4)..]);
+        assert!((held(&sound) - held(&once)).abs() < 0.5, "{attack:?}: {} {}", held(&sound), held(&once));
+    }
+}
+
 /// The lip is worked out anew at each of these events, and must be where it was.
 #[test]
 fn bends_that_change_nothing_leave_every_sample() {

@@ -100,10 +100,10 @@ pub fn notes(samples: &[f64], rate_hz: f64) -> (Vec<Note>, Vec<TrackPoint>) {
     let mut notes: Vec<Note> = Vec::new();
     for (at, part) in parts.iter().enumerate() {
         let after_s = notes.last().map_or(0.0, |note| note.end_s);
-        let before_s = parts.get(at + 1).map_or(f64::INFINITY, |next| 0.5 * (part.to_s + next.from_s));
+        let next = parts.get(at + 1);
+        let before_s = next.map_or(f64::INFINITY, |next| 0.5 * (part.to_s + next.from_s));
         let within = part.edges(samples, rate_hz, &envelope, (after_s, before_s));
         let found = measured(samples, rate_hz, within, part.hz);
-        let next = parts.get(at + 1);
         notes.extend(found.filter(|note| !next.is_some_and(|next| part.begins(next, note))));
     }
     (notes, track)

@@ -7,8 +7,10 @@
 //! what volume and pan do, `controllers` what all the others do. [Key switches](super::key_switches) do not reach it. Bend follows the heard note's channel and its MPE zone, see [`bends`](super::bends); RPN 0 sets a
 //! bend range, RPN 6 a zone. [`techniques`] says what the mod wheel and CC18 to CC20 do.
 //!
-//! While the sustain pedal (CC64) is down, the last note goes on after its key has come up, until the pedal comes up or another key is struck, which slurs; the same key again is tongued. A key that is struck again before it has come up is tongued, too, and comes up as often as it was
-//! struck. Left out: balance (CC8), portamento, sostenuto and soft pedal, program and bank.
+//! While the sustain pedal (CC64) is down, the last note goes on after its key has come up, until the pedal comes up or
+//! another key is struck, which slurs; the same key again is tongued. A key that is struck again before it has come up is
+//! tongued, too, and comes up as often as it was struck. Left out: balance (CC8), portamento, sostenuto and soft pedal,
+//! program and bank.
 //!
 //! Source: MIDI 1.0 Detailed Specification 4.2.1 (1996), control change numbers and registered parameters; RP-015 for
 //! CC121; RP-053 for MPE. Data bytes above 127 are read as 127 and channels modulo 16, so that every

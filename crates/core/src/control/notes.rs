@@ -1,9 +1,11 @@
 //! The notes that are held, and which of them is heard: the last one struck; when it is released, the one before it.
 //!
 //! A note is known by the id that its host gave it, its channel and its key, so that two notes of one key can be held at
-//! once. Without ids, as in MIDI, a key that is struck again before it has come up comes up as often as it was struck: parts that were recorded
-//! or quantised overlap so, and the end of the first note must not end the second. What belongs to a note (tuning, volume, pan, breath) stays with it while another one is heard. A pedal can hold
-//! the last note after its key has come up. Real-time safe throughout.
+//! once. Without ids, as in MIDI, a key that is struck again before it has come up comes up as often as it was struck:
+//! parts that were recorded or quantised overlap so, and the end of the first note must not end the second.
+//!
+//! What belongs to a note (tuning, volume, pan, breath) stays with it while another one is heard. A pedal can hold the last
+//! note after its key has come up. Real-time safe throughout.
 //!
 //! Source: CLAP 1.2, `events.h`: how note events name notes, and what a host wants to hear about their ends.
 
@@ -209,11 +211,12 @@ impl Notes {
         self.held[..self.count].iter_mut().for_each(|held| held.ends_to_pass = 0);
     }
 
-    /// A key comes up, once. See [`release`](Self::release).
+    /// A key comes up: once, where the address names key and channel, as MIDI does. See [`release`](Self::release).
     pub fn release_one(&mut self, address: NoteAddress, pedal: bool) {
+        let is_of_one = address.key.is_some() && address.channel.is_some();
         let passed = self.held[..self.count]
             .iter_mut()
-            .find(|held| address.key.is_some() && address.fits(held.note) && held.ends_to_pass > 0);
+            .find(|held| is_of_one && address.fits(held.note) && held.ends_to_pass > 0);
         match passed {
             Some(held) => held.ends_to_pass -= 1,
             None => self.release(address, pedal),

@@ -32,8 +32,8 @@ use crate::units::nearest_rate_hz;
 /// Samples up to this magnitude count as silence: -120 dBFS. A gain that raises them raises it as well: single precision may
 /// leave a bore ringing at -140 dBFS for ever.
 const SILENCE: f32 = 1e-6;
-/// Time of silence after which a resting instrument counts as silent, s: 4096 samples at 48 kHz, six periods of the lowest note of a
-/// double-bass clarinet.
+/// Time of silence after which a resting instrument counts as silent, s: 4096 samples at 48 kHz, five periods of the bass
+/// clarinet's lowest note.
 pub(super) const QUIET_S: f64 = 4_096.0 / 48_000.0;
 /// Host samples between two checks of level and limiter.
 const CHUNK: usize = 64;

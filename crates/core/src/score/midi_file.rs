@@ -6,8 +6,7 @@
 //! the end of a track are ignored.
 //!
 //! A key that is struck again before it has come up is let go first, so that both notes begin and end as written: recorded
-//! and quantised parts often overlap so. At the end
-//! of the last track, pedal and keys that are still down come up.
+//! and quantised parts often overlap so. At the end of the last track, pedal and keys that are still down come up.
 //!
 //! A damaged file is refused with the byte at which reading stopped; it is not played up to there.
 //! Source: Standard MIDI Files 1.0 (RP-001, 1988).

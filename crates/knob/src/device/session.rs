@@ -302,7 +302,7 @@ impl HostSession {
         Some(format!("WARNING: {doubt}; {next}"))
     }
 
-    /// What limits the torque of a knob whose firmware is of TTLink 1.0.
+    /// What limits the torque of a knob whose firmware is of TTLink 1.0, or which is not calibrated.
     pub fn restriction(&self) -> Option<String> {
         let info = self.info.as_ref().filter(|info| info.speaks_our_major())?;
         if info.checks_age() {

@@ -101,8 +101,8 @@ pub struct Info {
 /// Most torque that a device of TTLink 1.0 is asked for, mNm: it cannot tell an old permission from a new one, so that a
 /// late or repeated ARM may arm it. A finger holds this much (judgement).
 pub const UNDATED_CEILING_MNM: u16 = 50;
-/// Most torque that a device is asked for whose motor nobody has measured, mNm: it may make twice as much as it says. Such a device declares no
-/// more by itself; this is for one that does.
+/// Most torque that a device is asked for whose motor nobody has measured, mNm: what it says of its torque is a guess. This project's firmware
+/// then declares no more by itself; the host holds to it whatever is declared.
 pub const UNCALIBRATED_CEILING_MNM: u16 = 50;
 
 impl Info {

@@ -582,6 +582,12 @@ fn a_key_that_is_struck_again_before_it_comes_up_has_both_notes() {
     }
     midi.forget_repeats();
     assert_eq!(midi.note_off(0, 60), [off(60)]);
+
+    // An address of all channels means every note of the key.
+    midi.note_on(0, 60, 127);
+    midi.note_on(0, 60, 127);
+    midi.note_on(3, 60, 127);
+    assert_eq!(midi.release(key(60)), [off(60)]);
 }
 
 #[test]

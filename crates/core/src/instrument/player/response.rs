@@ -94,7 +94,7 @@ impl Response {
     ) -> f64 {
         match settings.breath_response {
             BreathResponse::Physical => {
-                self.lip = None;
+                (self.lip, self.is_below) = (None, false);
                 let gamma = physical(asked, settings, posture.closing) * (1.0 + bodily.sway.dynamic);
                 // A note that falls fades as far as it holds.
                 if bodily.fade < 1.0 { gamma.min(faded(gamma, bodily.fade)) } else { gamma }

@@ -22,8 +22,9 @@ const LEAST_SPEED: f64 = 0.05;
 /// The tongue takes at most this share of the time since the note before to let go: who plays quickly tongues quickly. With a tongue of 18 ms
 /// and a damped reed, sounding C5 to G5 at a velocity of 50 every 0.14 s were up to 11 dB softer than when held; with this, 1 dB.
 const OF_INTERVAL: f64 = 0.1;
-/// Longer intervals count as this one, s.
-const LONGEST_INTERVAL_S: f64 = 1.0;
+/// Intervals that count, s. A note that the next one followed sooner was none: a key may be struck twice in one moment. Longer ones count as the
+/// longest.
+const INTERVALS_S: (f64, f64) = (0.01, 1.0);
 /// How long the tongue takes to reach the reed when it stops a note, s.
 const STOP_S: f64 = 0.005;
 /// Time constant with which the force on the reed grows, s, so that the tongue lands softly.
@@ -57,7 +58,7 @@ pub struct Tongue {
     position: Position,
     /// Time for which it has been away, s, up to [`LATEST_S`].
     away_s: f64,
-    /// Time since it went to the reed before a note, s, and the same when it last went there, both up to [`LONGEST_INTERVAL_S`].
+    /// Time since it went to the reed before a note, s, and from then to the time before, within [`INTERVALS_S`].
     since_s: f64,
     interval_s: f64,
     /// The note before still rings, and it lets go in time with that.
@@ -77,8 +78,8 @@ impl Default for Tongue {
         Self {
             position: Position::Resting,
             away_s: LATEST_S,
-            since_s: LONGEST_INTERVAL_S,
-            interval_s: LONGEST_INTERVAL_S,
+            since_s: INTERVALS_S.1,
+            interval_s: INTERVALS_S.1,
             is_in_time: false,
             is_due: false,
             has_slapped: false,
@@ -98,11 +99,14 @@ impl Tongue {
     pub fn hold(&mut self, is_in_time: bool) {
         self.is_in_time = is_in_time;
         self.position = Position::Holding(HOLD_S);
-        (self.interval_s, self.since_s) = (self.since_s, 0.0);
+        if self.since_s >= INTERVALS_S.0 {
+            self.interval_s = self.since_s;
+        }
+        self.since_s = 0.0;
         (self.away_s, self.is_due, self.has_slapped) = (0.0, false, false);
     }
 
-    /// Time from the note before to this one, s, up to [`LONGEST_INTERVAL_S`].
+    /// Time from the note before to this one, s, within [`INTERVALS_S`].
     pub fn interval_s(&self) -> f64 {
         self.interval_s
     }
@@ -236,7 +240,7 @@ impl Tongue {
     ) -> f64 {
         let tick_s = context.tick_s;
         let speed = speed(gamma);
-        self.since_s = (self.since_s + tick_s).min(LONGEST_INTERVAL_S);
+        self.since_s = (self.since_s + tick_s).min(INTERVALS_S.1);
         let (position, share) = match self.position {
             Position::Resting => (Position::Resting, 1.0),
             Position::Away => {
