@@ -587,7 +587,7 @@ fn assert_smooth(slurs: &[Slurred]) {
     let (hole_db, back_ms) = octaves(slurs);
     let clicks_db = [0.5, 0.9].map(|share| quantile(slurs.iter().map(|s| s.click_db), share));
     println!("octaves: hole {hole_db:.1} dB, back {back_ms:.0} ms; clicks {clicks_db:.1?} dB");
-    assert!(hole_db <= 9.5 && back_ms <= 47.0);
+    assert!(hole_db <= 9.5 && back_ms <= 50.0);
     assert!(slurs.iter().all(|s| s.bump_db <= 2.0));
     assert!(clicks_db[0] <= 1.0 && clicks_db[1] <= 3.0);
 }
@@ -598,12 +598,12 @@ fn all_slurs_arrive_without_bumps() {
 }
 
 /// None is lost at any breath. Down over the break the old note died in the lengthening column: into the throat soft slurs had holes of up to 31 dB, and leaps into the low chalumeau
-/// half of theirs of more than 25.
+/// half of theirs of more than 25. Before the breath pushed they were 17 and 16.
 #[test]
 fn slurs_down_over_the_break_keep_sounding() {
     // Names, new notes, from how many semitones on; how deep half of the holes, nine tenths, and all may be, dB.
-    let throat = ("into the throat", 64..=70, 1, [6.0, 12.0, 18.0]);
-    let low = ("leaps into the low chalumeau", 52..=63, 13, [17.5, 25.0, 38.0]);
+    let throat = ("into the throat", 64..=70, 1, [4.0, 6.5, 10.0]);
+    let low = ("leaps into the low chalumeau", 52..=63, 13, [5.0, 12.0, 18.0]);
     for (name, to, least, most_db) in [throat, low] {
         let pairs: Vec<(u8, u8)> = (71..=84)
             .flat_map(|from| to.clone().map(move |to| (from, to)))

@@ -27,6 +27,7 @@ mod lip_glide;
 mod other_reed;
 mod pitch_ear;
 mod posture;
+mod push;
 mod reed_at_note;
 mod reed_glide;
 mod reed_smoothing;
@@ -65,6 +66,7 @@ use inhalation::Inhalation;
 use level_keeper::{Led, LevelKeeper};
 use lip_glide::LipGlide;
 use posture::{Fingered, Lags, Posture};
+use push::Pushing;
 use reed_glide::ReedGlide;
 use reed_smoothing::ReedSmoothing;
 use response::{Bodily, Response};
@@ -76,8 +78,9 @@ use tuning::PlayedTuning;
 use velocities::Velocities;
 use voicing::{Voiced, Voicing};
 
-/// Time the fingers take behind the tongue, ms; slurred they take the setting's time.
-const TONGUED_FINGERS_MS: f64 = 5.0;
+/// Time the fingers take behind the tongue, periods of the lowest note: 5 ms on a B flat clarinet, 13 on a bass, whose keys are heavier
+/// (by judgement). Slurred they take the setting's time.
+const TONGUED_FINGERS_PERIODS: f64 = 0.75;
 
 /// What the parts of a player need to know in one control tick.
 struct TickContext<'a> {
@@ -153,6 +156,7 @@ pub struct Player {
     /// How far the note that was fingered last lies from the pitch of its fingering in the chart, cents: by its key and its alternate.
     fingered_cents: f64,
     lip_glide: LipGlide,
+    pushing: Pushing,
     onset: Onset,
     swaying: Swaying,
     inflection: Inflection,
@@ -420,7 +424,9 @@ impl Player {
         self.fingered_cents += alternate.map_or(0.0, |alternate| alternate.cents);
         self.ear.begin(if slurred { Begun::Slurred } else { Begun::Tongued });
         if !slurred {
-            return self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
+            self.pushing = Pushing::default();
+            let ticks = (TONGUED_FINGERS_PERIODS / model.size_hz / self.tick_s(model)).round() as u32;
+            return self.walk(fingering, ticks, slur::TONGUED, model, voice);
         }
         let legato_s = 1e-3 * f64::from(self.settings.legato_ms);
         let slur = self.fingers.fingering().map(|from| Slur {
@@ -436,12 +442,12 @@ impl Player {
             (Some(slur), BreathResponse::Played) => {
                 let gamma = self.breath.gamma();
                 self.lip_glide.help(slur.lip_help(gamma));
-                let ticks = self.legato_ticks(model);
+                let (ticks, walk) = (self.legato_ticks(model), slur.walk(gamma));
+                self.pushing.begin(slur.push(), walk.time * legato_s, slur.note_hz);
                 if slur.is_within_a_register() {
                     self.ear.begin(Begun::SlurredWithin);
                 }
-                self.fingers.walk_to(fingering, ticks, slur.walk(gamma), model, voice.lattice_mut());
-                self.posture = None;
+                self.walk(fingering, ticks, walk, model, voice);
             }
             (slur, _) => {
                 if let Some(Slur { interval_cents, registers: (from, to), .. }) = slur {
@@ -482,6 +488,18 @@ impl Player {
     /// Control ticks that the fingers take between slurred notes.
     fn legato_ticks(&self, model: &Model) -> u32 {
         (1e-3 * f64::from(self.settings.legato_ms) / self.tick_s(model)).round() as u32
+    }
+
+    fn walk<F: Real>(
+        &mut self,
+        fingering: usize,
+        ticks: u32,
+        walk: slur::Walk,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) {
+        self.fingers.walk_to(fingering, ticks, walk, model, voice.lattice_mut());
+        self.posture = None;
     }
 
     fn move_holes<F: Real>(&mut self, fingering: usize, time_s: f64, model: &Model, voice: &mut Voice<F>) {
@@ -617,7 +635,8 @@ impl Player {
 
         self.breath.tick(target, key_down, tongue_holds, &context);
         let gamma = self.breath.gamma();
-        let shaken = self.techniques.shake(gamma, note_hz * self.tuning.speed(), settings, tick_s);
+        let shaken = self.techniques.shake(gamma, note_hz * self.tuning.speed(), settings, tick_s)
+            * self.pushing.tick(tick_s);
         let hardness =
             self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
         let speaks = self.tongue.is_due() && self.response.hears(&self.ear);

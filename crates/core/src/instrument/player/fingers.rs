@@ -222,8 +222,8 @@ impl Fingers {
         }
     }
 
-    /// Moves the fingers to a fingering one after another, as a slur has it, whose time is `ticks` control ticks. Where the hole nearest to
-    /// the bell goes first, what it does is hardly heard, and the hole that makes the new note is the last.
+    /// Moves the fingers to a fingering one after another, as a slur has it, whose time is `ticks` control ticks. The hole nearest to the bell goes
+    /// first: what it does is hardly heard, and the hole that makes the new note is the last.
     pub fn walk_to<F: Real>(
         &mut self,
         fingering: usize,
@@ -250,9 +250,8 @@ impl Fingers {
         self.walk.ticks = ((f64::from(ticks) * share) as usize).max(1);
         let spread = (f64::from(ticks) - self.walk.ticks as f64).max(0.0) / f64::from(count.max(2) - 1);
         // Holes are in order from the mouth.
-        for (n, hole) in (0..holes).filter(|hole| moving >> hole & 1 == 1).enumerate() {
-            let rank = if walk.mouth_first { n } else { count as usize - 1 - n };
-            self.walk.waits[hole] = 1 + (spread * rank as f64) as u16;
+        for (n, hole) in (0..holes).rev().filter(|hole| moving >> hole & 1 == 1).enumerate() {
+            self.walk.waits[hole] = 1 + (spread * n as f64) as u16;
         }
         self.walk.left = (ticks + 1).min(u32::from(u16::MAX)) as u16;
         self.step(model, lattice);
