@@ -34,7 +34,7 @@ def sound(path, columns):
         with open(path, encoding="utf-8-sig") as file:
             names = file.readline().strip().split(",")
             places = [names.index(name) for name in columns]
-            read = np.loadtxt(file, delimiter=",", usecols=places, ndmin=2)
+            read = np.loadtxt(file, delimiter=",", usecols=places, ndmin=2, quotechar='"')
     except (OSError, ValueError):
         return None
     return list(read.T) if len(read) and not np.isinf(read).any() else None

@@ -79,9 +79,9 @@ def reeds(program, equal_travel=True):
             line = f"haptic --all --torque {TORQUE_MNM:g} --ceiling 450 --H {h} --k {k_of(h, condition):.6f} --csv -"
             words = line.split() + (["--equal-travel"] if equal_travel else [])
             rows = tell(program, words)
-            by_note = {int(row["written_midi"]): {name: float(row[name]) for name in row} for row in rows}
+            by_note = {int(row["written_midi"]): row for row in rows}
             found[h, condition] = {
-                name: np.array([by_note[written][name] for written in WRITTEN])
+                name: np.array([float(by_note[written][name]) for written in WRITTEN])
                 for name in ("a_on_deg", "a_close_deg", "scale_mnm", "gamma_sounding", "h", "k")
             }
     return found

@@ -1,5 +1,6 @@
 //! The command line as a user and a script meet it: each kind of mistake, and the tables others read.
 
+use chalumeau_core::units::WrittenNote;
 use some::some;
 use std::ffi::OsStr;
 use std::fs;
@@ -681,17 +682,29 @@ fn a_wav_file_is_as_long_and_deep_as_asked() {
 
 /// Header first, comments marked, every data line with as many numbers as the header has names.
 #[track_caller]
+/// Numbers of a table; the name of a note, where it has one, must be that of its number, and is left out.
 fn table(text: &str, header: &str) -> Vec<Vec<f64>> {
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some(header));
+    let numbers = header.strip_prefix("written,").unwrap_or(header);
     lines
         .filter(|line| !line.starts_with('#'))
         .map(|line| {
+            let (name, line) = if numbers == header { (None, line) } else { name_and_rest(line) };
             let row: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
-            assert_eq!(row.len(), header.split(',').count(), "{line}");
+            assert_eq!(row.len(), numbers.split(',').count(), "{line}");
+            assert!(
+                name.is_none_or(|name| name.trim_matches('"') == WrittenNote(row[0] as u8).to_string()),
+                "{line}"
+            );
             row
         })
         .collect()
+}
+
+fn name_and_rest(line: &str) -> (Option<&str>, &str) {
+    let (name, rest) = line.split_once(',').unwrap();
+    (Some(name), rest)
 }
 
 #[test]
@@ -706,18 +719,19 @@ fn tables_keep_their_contract() {
         assert_eq!((row[3], row[4]), (p * p.sqrt(), f64::from(u8::from(i > 0))));
     }
     let peaks = succeeds(d.path(), "impedance --all --peaks 8 --model tmm --csv -");
-    let peaks = table(&peaks, "written_midi,n,f_hz,mag_over_zc,q");
+    let peaks = table(&peaks, "written,written_midi,n,f_hz,mag_over_zc,q");
     assert_eq!(peaks.len(), 46 * 8);
     assert_eq!((peaks[0][0], peaks[0][1]), (52.0, 1.0));
     assert!((peaks[0][2] - 148.518).abs() < 0.1, "{:?}", peaks[0]);
     let curve =
         table(&succeeds(d.path(), "impedance --written 65 --csv -"), "f_hz,re_z_over_zc,im_z_over_zc");
     assert_eq!((curve[0][0], curve[3980][0], curve.len()), (20.0, 4000.0, 3981));
-    let on = table(&succeeds(d.path(), "threshold --all --zeta 0.3 --csv -"), "written_midi,gamma_on");
+    let on =
+        table(&succeeds(d.path(), "threshold --all --zeta 0.3 --csv -"), "written,written_midi,gamma_on");
     assert_eq!(on.len(), 46);
     assert!(on.iter().all(|row| row[1] > 1.0 / 3.0 && row[1] < 0.6), "{on:?}");
     let tune = "tune --written 60 --rate 48000 --gamma 0.5 --csv -";
-    let tune = table(&succeeds(d.path(), tune), "written_midi,f_hz,cents,register_ok,as_built_cents");
+    let tune = table(&succeeds(d.path(), tune), "written,written_midi,f_hz,cents,register_ok,as_built_cents");
     assert!((tune[0][1] - 233.08).abs() < 2.0 && tune[0][3] == 1.0, "{tune:?}");
 }
 
@@ -876,7 +890,7 @@ fn instruments_are_played_by_name_and_files_are_tuned_once() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let table = String::from_utf8(output.stdout).unwrap();
         let numbers: Vec<f64> =
-            table.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+            table.lines().last().unwrap().split(',').skip(1).map(|cell| cell.parse().unwrap()).collect();
         (numbers[1], numbers[2])
     };
     for (instrument, sounds_hz) in [("a", 220.0), ("bass", 116.54), ("c", 261.63), ("Bb", 233.08)] {
@@ -1426,7 +1440,7 @@ fn silence_has_no_pitch_and_no_beginning() {
     let d = tempfile::tempdir().unwrap();
     for silent in ["--gamma 0", "--dynamic 0 --A 0", "--gamma 0 --gain-db 24"] {
         let rows = succeeds(d.path(), &format!("tune --written C5 {silent}"));
-        assert_eq!(rows.lines().last(), Some("72,nan,nan,0,nan"), "{silent}");
+        assert_eq!(rows.lines().last(), Some("C5,72,nan,nan,0,nan"), "{silent}");
     }
     let soft = succeeds(d.path(), "tune --written E3 --dynamic pp --gain-db -60");
     assert!(soft.lines().last().unwrap().ends_with(|of: char| of.is_ascii_digit()), "{soft}");
@@ -1586,7 +1600,7 @@ fn a_note_that_stays_silent_is_told_where_it_is_rendered() {
     assert!(message.contains("does not speak in tune on this instrument"), "{message}");
     // The theory knows nothing of it.
     let rows = succeeds(d.path(), "haptic --written C#7");
-    assert!(rows.lines().last().unwrap().starts_with("97,0.4"), "{rows}");
+    assert!(rows.lines().last().unwrap().starts_with("\"C#7\",97,0.4"), "{rows}");
 }
 
 #[test]

@@ -40,10 +40,10 @@ fn haptic(words: &str) -> BTreeMap<u8, Note> {
     assert!(output.status.success(), "{words}: {error}");
     let text = String::from_utf8(output.stdout).unwrap();
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-    assert_eq!(lines.next(), Some(COLUMNS.join(",").as_str()));
+    assert_eq!(lines.next(), Some(format!("written,{}", COLUMNS.join(",")).as_str()));
     lines
         .map(|line| {
-            let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
+            let fields: Vec<f64> = line.split(',').skip(1).map(|field| field.parse().unwrap()).collect();
             assert_eq!(fields.len(), COLUMNS.len(), "{line}");
             let note: Note = COLUMNS.into_iter().zip(fields).collect();
             (note["written_midi"] as u8, note)

@@ -796,11 +796,14 @@ mod command {
         out.lines()
             .skip(1)
             .filter(|line| !line.starts_with('#'))
-            .map(|line| line.split(',').map(|field| field.parse().unwrap()).collect())
+            .map(|line| {
+                let fields = line.split(',').skip(usize::from(header == TABLE));
+                fields.map(|field| field.parse().unwrap()).collect()
+            })
             .collect()
     }
 
-    const TABLE: &str = "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg,most_mnm";
+    const TABLE: &str = "written,written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg,most_mnm";
 
     #[test]
     fn table_of_all_notes_and_curve_of_one() {

@@ -270,6 +270,21 @@ fn arming_with_the_usual_feel_works_and_more_than_250_mnm_needs_an_answer() {
     assert!(ok && ceilings == [300], "{ceilings:?}: {said}");
 }
 
+/// A script sees it in the exit code, as a person does in the line.
+#[test]
+fn a_knob_that_lets_go_by_itself_is_a_failure() {
+    let (_alone, directory) = (alone(), tempfile::tempdir().unwrap());
+    let knob = PtyKnob::plug(None, &Setup::default());
+    let mut command = chalumeau(&directory, &knob.path, "knob", &["--arm", "60", "--seconds", "3"]);
+    let child = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    armed(&knob);
+    knob.faults.reboot.store(true, Ordering::Relaxed);
+    limp(&knob);
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+}
+
 /// A knob that misbehaves behind a pseudo-terminal, until dropped.
 struct FakePty {
     path: PathBuf,

@@ -1,7 +1,7 @@
 //! `chalumeau haptic`: the torque of a force-feedback knob for each note.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::{TableArgs, number};
+use crate::cli::csv_table::{TableArgs, named, number};
 use crate::cli::feel_args::{FeelArgs, refused_in_flags};
 use crate::cli::plot_args::{Plot, PlotArgs};
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
@@ -46,7 +46,7 @@ Examples:
 /// reed as it moves begins to sound. At wall_deg a wall begins, a stiff spring; where a_off_deg lies beyond it, the hand meets the wall before the note falls silent. All pressures are those of the transfer-matrix model; `knob`, `report` and the plugin take those of
 /// the waveguide that is played, up to 2 % apart.
 ///
-/// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg,most_mnm; a note
+/// Columns: written,written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg,most_mnm; a note
 /// for which the theory finds no pressures has nan for them. A note that does not speak in tune and stays silent, such as C#7, has numbers. scale_mnm is the torque at the peak of the flow law with H = sqrt(27)/2, without the mark (--detent) that is added at the threshold; most_mnm is the most torque up to the wall, with the mark and the friction: what --ceiling must allow. h and k are those of the law. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
 /// against the breath. --plot draws torque against angle: of the note that is asked for, or of the easiest, the lowest, the
 /// reference and the hardest.
@@ -179,7 +179,7 @@ impl HapticCommand {
         }
         let mut table = self.table.open_beside(
             &plot,
-            "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg,most_mnm",
+            "written,written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding,wall_deg,most_mnm",
         )?;
         table.comment(format_args!(
             "{}; {}; {:.1} C, {} about {}",
@@ -199,7 +199,8 @@ impl HapticCommand {
                 (pressure(|asked| asked.p_req_pa), pressure(|asked| asked.gamma_sounding));
             let (a, feel, most_mnm) = (note.landmarks, note.feel, note.most_mnm());
             table.line(format_args!(
-                "{},{},{},{},{:.4},{:.4},{:.4},{:.4},{},{},{},{:.2},{:.2}",
+                "{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{},{},{},{:.2},{:.2}",
+                named(note.written),
                 note.written.0,
                 number(gamma_on, 6),
                 number(gamma_off, 4),

@@ -1,7 +1,7 @@
 //! `chalumeau impedance`: the input impedance of the bore, as a curve or as its peaks.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::TableArgs;
+use crate::cli::csv_table::{TableArgs, named};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, QualityArg, counted, whole, within};
 use chalumeau_core::analysis::impedance::cutoff_hz;
@@ -81,7 +81,7 @@ impl CurveRange {
 ///
 /// A curve is of one note: choose it with --written. All notes need --peaks.
 ///
-/// Columns: f_hz,re_z_over_zc,im_z_over_zc, or with --peaks written_midi,n,f_hz,mag_over_zc,q.
+/// Columns: f_hz,re_z_over_zc,im_z_over_zc, or with --peaks written,written_midi,n,f_hz,mag_over_zc,q.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ImpedanceCommand {
@@ -158,7 +158,7 @@ impl ImpedanceCommand {
             air.z_c(file.nominal_radius_m)
         );
         let header = if self.peaks.is_some() {
-            "written_midi,n,f_hz,mag_over_zc,q"
+            "written,written_midi,n,f_hz,mag_over_zc,q"
         } else {
             "f_hz,re_z_over_zc,im_z_over_zc"
         };
@@ -170,8 +170,9 @@ impl ImpedanceCommand {
             if let Some(count) = self.peaks {
                 let peaks = bore.peaks(&fingering.open, volume_m3, usize::from(count));
                 for (n, peak) in (1..).zip(peaks) {
-                    let (written, f_hz, mag, q) = (fingering.written.0, peak.f_hz, peak.mag_over_zc, peak.q);
-                    table.line(format_args!("{written},{n},{f_hz:.4},{mag:.6},{q:.4}"))?;
+                    let (note, f_hz, mag, q) = (fingering.written, peak.f_hz, peak.mag_over_zc, peak.q);
+                    let (name, written) = (named(note), note.0);
+                    table.line(format_args!("{name},{written},{n},{f_hz:.4},{mag:.6},{q:.4}"))?;
                 }
             } else {
                 for (f_hz, z) in self.curve(&bore, &fingering.open, volume_m3) {

@@ -1,7 +1,7 @@
 //! `chalumeau radiation`: what ways of listening hear of a fingering, beside the power average over all directions.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::TableArgs;
+use crate::cli::csv_table::{TableArgs, named};
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within_f32};
 use chalumeau_core::instrument::listening::{Listening, ListeningMode};
 use chalumeau_core::measure::radiated_bands::{COUNTED_HZ, RadiatedBand, RadiatedBands, rms_and_worst};
@@ -32,7 +32,7 @@ enum Heard {
 /// differ in phase, and what is heard depends on where one listens. The flows are those of the transfer matrices, for the same flow through the reed at all
 /// frequencies.
 ///
-/// Columns: written_midi,register,f_hz,average_db,heard_db. Frequencies are the centres of third octaves from that of the note up, or harmonics of the note; decibels are over one
+/// Columns: written,written_midi,register,f_hz,average_db,heard_db. Frequencies are the centres of third octaves from that of the note up, or harmonics of the note; decibels are over one
 /// point that sends out the sum of all flows.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -79,7 +79,7 @@ impl RadiationCommand {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         let air = self.air.air();
-        let mut table = self.table.open("written_midi,register,f_hz,average_db,heard_db")?;
+        let mut table = self.table.open("written,written_midi,register,f_hz,average_db,heard_db")?;
         let bands = RadiatedBands::new(&file, air);
         let listening = Listening {
             mode: ListeningMode::Position,
@@ -114,9 +114,10 @@ impl RadiationCommand {
         }
         for (fingering, bands) in fingerings.iter().zip(&heard) {
             for RadiatedBand { centre_hz, average_db, heard_db } in bands {
-                let (written, register) = (fingering.written.0, &fingering.register);
+                let (name, written, register) =
+                    (named(fingering.written), fingering.written.0, &fingering.register);
                 table.line(format_args!(
-                    "{written},{register},{centre_hz:.1},{average_db:.2},{heard_db:.2}"
+                    "{name},{written},{register},{centre_hz:.1},{average_db:.2},{heard_db:.2}"
                 ))?;
             }
         }

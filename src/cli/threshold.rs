@@ -1,7 +1,7 @@
 //! `chalumeau threshold`: the mouth pressure at which each note begins to sound.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::TableArgs;
+use crate::cli::csv_table::{TableArgs, named};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -55,7 +55,7 @@ impl ThresholdCommand {
         let notes = self.notes.notes(&file)?;
         let model = TransferMatrix::new(&file, self.air.air());
         let plot = self.plot.open(self.table.force())?;
-        let mut table = self.table.open_beside(&plot, "written_midi,gamma_on")?;
+        let mut table = self.table.open_beside(&plot, "written,written_midi,gamma_on")?;
         table.comment(format_args!(
             "{}; quasi-static reed, zeta {}; {:.1} C",
             file.name,
@@ -87,9 +87,10 @@ impl ThresholdCommand {
                 .collect(),
         };
         for (written, gamma_on) in thresholds(self.zeta).gamma_on {
+            let name = named(WrittenNote(written));
             match gamma_on.is_finite() {
-                true => table.line(format_args!("{written},{gamma_on:.6}"))?,
-                false => table.line(format_args!("{written},nan"))?,
+                true => table.line(format_args!("{name},{written},{gamma_on:.6}"))?,
+                false => table.line(format_args!("{name},{written},nan"))?,
             }
         }
         table.finish()?;

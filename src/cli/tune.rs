@@ -1,7 +1,7 @@
 //! `chalumeau tune`: plays every note and measures its pitch.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::{TableArgs, number};
+use crate::cli::csv_table::{TableArgs, named, number};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::progress_bar::progress;
 use crate::cli::score_args::{GAMMA_DEFAULT, preset_called};
@@ -112,7 +112,7 @@ impl TuneCommand {
         let transposition = file.transposition;
         let plot = self.plot.open(self.table.force())?;
         let mut table =
-            self.table.open_beside(&plot, "written_midi,f_hz,cents,register_ok,as_built_cents")?;
+            self.table.open_beside(&plot, "written,written_midi,f_hz,cents,register_ok,as_built_cents")?;
         let tuning = if self.instrument.is_as_built() { "as built" } else { name_of(settings.tuning) };
         table.comment(format_args!(
             "{name}, {tuning}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on{}",
@@ -129,15 +129,17 @@ impl TuneCommand {
             Some(model) => measure_all(&notes, model, &curve, &settings, rate),
             None => as_built.clone(),
         };
-        for ((WrittenNote(written), heard), as_built) in notes.iter().zip(&heard).zip(&as_built) {
+        for ((note, heard), as_built) in notes.iter().zip(&heard).zip(&as_built) {
+            let (name, WrittenNote(written)) = (named(note), note);
             let as_built = number(as_built.map_or(f64::NAN, |(_, cents)| cents), 3);
             match heard {
                 Some((f_hz, cents)) => {
                     let register_ok = u8::from(cents.abs() <= OTHER_CENTS);
                     let cents = number(*cents, 3);
-                    table.line(format_args!("{written},{f_hz:.5},{cents},{register_ok},{as_built}"))?;
+                    table
+                        .line(format_args!("{name},{written},{f_hz:.5},{cents},{register_ok},{as_built}"))?;
                 }
-                None => table.line(format_args!("{written},nan,nan,0,{as_built}"))?,
+                None => table.line(format_args!("{name},{written},nan,nan,0,{as_built}"))?,
             }
         }
         table.finish()?;

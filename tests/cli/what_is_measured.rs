@@ -20,7 +20,7 @@ fn a_report_has_the_pitch_that_sounds() {
         ("B5", "--zeta 0.9 --gamma 0.9", -1_960.0..-1_840.0),
     ] {
         let tuned = succeeds(d.path(), &format!("tune --written {note} {blown} --no-noise"));
-        let off: f64 = tuned.lines().last().unwrap().split(',').nth(2).unwrap().parse().unwrap();
+        let off: f64 = tuned.lines().last().unwrap().split(',').nth(3).unwrap().parse().unwrap();
         assert!(cents.contains(&off), "{note}: {off}");
         let line = format!("report --written {note} {blown} --seconds 1.5 --no-noise --force --out x.html");
         succeeds(d.path(), &line);
