@@ -36,6 +36,7 @@ pub mod presets;
 pub mod scale_file;
 #[cfg(feature = "standalone")]
 pub mod standalone;
+#[cfg(feature = "devices")]
 pub mod take_file;
 pub mod text_file;
 pub mod tour;

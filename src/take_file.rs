@@ -2,9 +2,14 @@
 
 use std::io;
 use std::path::Path;
+use std::time::SystemTime;
 
+use chalumeau_knob::device::serial_text;
 use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
 use chalumeau_knob::touch::take_csv::TakeWriter;
+use chalumeau_knob::wire::Info;
+use time::OffsetDateTime;
+use time::format_description::well_known::Rfc3339;
 
 use crate::output::{NewFile, OutputError};
 
@@ -14,10 +19,11 @@ pub struct TakeFile {
 }
 
 impl TakeFile {
-    /// Begins `file` with remarks, one per line, and the names of the columns.
-    pub fn begin(file: NewFile, remarks: &[String]) -> Result<Self, OutputError> {
+    /// Begins `file` with remarks, one per line, the time of day, and the names of the columns.
+    pub fn begin(file: NewFile, mut remarks: Vec<String>) -> Result<Self, OutputError> {
         let path = file.path().to_owned();
-        match TakeWriter::new(file, remarks) {
+        remarks.extend(time_of_day(SystemTime::now()).map(|now| format!("begun {now}")));
+        match TakeWriter::new(file, &remarks) {
             Ok(writer) => Ok(Self { writer }),
             Err(source) => Err(OutputError::Write { path, source }),
         }
@@ -39,6 +45,19 @@ impl TakeFile {
     }
 }
 
+/// What a knob says of itself, for the remarks of a take.
+pub fn knob_in_words(info: &Info) -> String {
+    let (major, minor, patch) = info.firmware;
+    let (name, serial) = (info.name_text(), serial_text(info.serial));
+    format!("{name}, serial number {serial}, firmware {major}.{minor}.{patch}")
+}
+
+/// Universal time to the millisecond, so that a take can be laid beside a video; `None` for a clock beyond all years.
+fn time_of_day(now: SystemTime) -> Option<String> {
+    let now = OffsetDateTime::from(now);
+    now.replace_millisecond(now.millisecond()).ok()?.format(&Rfc3339).ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -48,11 +67,19 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("take.csv");
         let file = NewFile::create(&path, false).unwrap();
-        let mut take = TakeFile::begin(file, &["participant 7".to_owned()]).unwrap();
+        let mut take = TakeFile::begin(file, vec!["participant 7".to_owned()]).unwrap();
         assert_eq!(take.path().file_name(), path.file_name());
         take.write(&TakeRow::default(), &TakeMarks::default()).unwrap();
         assert!(!path.exists(), "no half-written file");
         take.keep().unwrap();
-        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 3);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.lines().count(), 4);
+        assert!(text.lines().nth(1).unwrap().starts_with("# begun 2"), "{text}");
+    }
+
+    #[test]
+    fn a_take_begins_at_a_time_of_day() {
+        let at = SystemTime::UNIX_EPOCH + std::time::Duration::from_micros(1_796_061_012_345_678);
+        assert_eq!(time_of_day(at).as_deref(), Some("2026-11-30T17:50:12.345Z"));
     }
 }

@@ -8,7 +8,7 @@ use crate::cli::{Failure, INTERRUPTED};
 use crate::feel_flags;
 use crate::identity::VERSION;
 use crate::output::{NewFile, OutputError, remove_unfinished_and_exit};
-use crate::take_file::TakeFile;
+use crate::take_file::{TakeFile, knob_in_words};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelDesign, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
@@ -205,13 +205,11 @@ impl KnobCommand {
         let knob = match knob {
             None => "a knob that does not say what torque it makes".to_owned(),
             Some(info) => {
-                let ((major, minor, patch), serial) = (info.firmware, serial_text(info.serial));
                 let armed = match self.arm {
                     Some(mnm) => format!("may be armed with at most {mnm} mNm"),
                     None => "never armed: it turned freely".to_owned(),
                 };
-                let name = info.name_text();
-                format!("{name}, serial number {serial}, firmware {major}.{minor}.{patch}, {armed}")
+                format!("{}, {armed}", knob_in_words(info))
             }
         };
         let head = TakeHead {
@@ -357,7 +355,7 @@ impl KnobCommand {
                 live_since = Some(Instant::now());
                 let settled = settle(&status)?;
                 note = settled.note;
-                take = file.take().map(|file| TakeFile::begin(file, &settled.remarks)).transpose()?;
+                take = file.take().map(|file| TakeFile::begin(file, settled.remarks.clone())).transpose()?;
                 let stray_deg = status.stray_deg.filter(|_| !self.zero);
                 match (self.arm.is_some(), stray_deg) {
                     (true, Some(stray_deg)) => enter = Some(ask_for_enter(&Doubt::Stray(stray_deg))?),

@@ -239,7 +239,9 @@ impl SlowWork {
         moments.set_possible(Moment::Record, has_knob);
         let settings = self.params.settings().with_reed_factors(self.shared.reed_factors());
         let is_new = wanted && self.recorder.rows().is_none();
-        if is_new && let Err(reason) = self.recorder.begin(&self.params, &self.head(&settings, status)) {
+        let info = status.and_then(|status| status.info.as_ref());
+        if is_new && let Err(reason) = self.recorder.begin(&self.params, &self.head(&settings, status), info)
+        {
             self.params.moments.set_possible(Moment::Record, false);
             self.texts.take = Some(reason);
             return;

@@ -9,10 +9,11 @@ use super::feel_design::feel_design;
 use super::heard_sound::SoundListener;
 use crate::output::NewFile;
 use crate::plugin::params::ChalumeauParams;
-use crate::take_file::TakeFile;
-use chalumeau_core::instrument::Settings;
+use crate::take_file::{TakeFile, knob_in_words};
+use chalumeau_core::instrument::{BreathResponse, Settings};
 use chalumeau_knob::touch::study::{StudySide, plan};
 use chalumeau_knob::touch::take::{Take, TakeHead, TakeMarks, TakeRow};
+use chalumeau_knob::wire::Info;
 
 /// Environment variable that names another folder for takes.
 const TAKES: &str = "CHALUMEAU_TAKES";
@@ -44,10 +45,15 @@ impl TakeRecorder {
         Self { recording: None, sound, waiting: VecDeque::new() }
     }
 
-    /// Opens a new take that begins with this head, if none is open.
-    pub fn begin(&mut self, params: &ChalumeauParams, head: &TakeHead) -> Result<(), String> {
+    /// Opens a new take of a knob that begins with this head, if none is open.
+    pub fn begin(
+        &mut self,
+        params: &ChalumeauParams,
+        head: &TakeHead,
+        knob: Option<&Info>,
+    ) -> Result<(), String> {
         if self.recording.is_none() {
-            self.recording = Some(create(params, head)?);
+            self.recording = Some(create(remarks(params, head, knob))?);
         }
         Ok(())
     }
@@ -124,7 +130,7 @@ pub fn marks(params: &ChalumeauParams, settings: &Settings) -> TakeMarks {
 }
 
 /// Creates a new take in the folder of takes.
-fn create(params: &ChalumeauParams, head: &TakeHead) -> Result<Recording, String> {
+fn create(remarks: Vec<String>) -> Result<Recording, String> {
     let folder = match std::env::var_os(TAKES) {
         Some(folder) => PathBuf::from(folder),
         None => dirs::document_dir()
@@ -147,13 +153,13 @@ fn create(params: &ChalumeauParams, head: &TakeHead) -> Result<Recording, String
         })
         .find(|path| !path.exists())
         .ok_or_else(|| format!("{} has too many takes of this second", folder.display()))?;
-    let begun = NewFile::create(&path, false).and_then(|file| TakeFile::begin(file, &remarks(params, head)));
+    let begun = NewFile::create(&path, false).and_then(|file| TakeFile::begin(file, remarks));
     let writer = begun.map_err(|reason| reason.to_string())?;
     Ok(Recording { writer, path, rows: 0, error: None })
 }
 
-/// The lines above a take's columns: program, what is played and felt at the beginning, and the order of the study's trials.
-fn remarks(params: &ChalumeauParams, head: &TakeHead) -> Vec<String> {
+/// The lines above a take's columns: program, knob, what is played and felt at the beginning, and the order of the study's trials.
+fn remarks(params: &ChalumeauParams, head: &TakeHead, device: Option<&Info>) -> Vec<String> {
     let knob = &params.knob;
     let feel = feel_design(knob);
     let mut remarks = vec![
@@ -172,6 +178,12 @@ fn remarks(params: &ChalumeauParams, head: &TakeHead) -> Vec<String> {
             feel.morph_ms
         ),
     ];
+    remarks.extend(device.map(knob_in_words));
+    let response = match params.settings().breath_response {
+        BreathResponse::Played => "played",
+        BreathResponse::Physical => "physical",
+    };
+    remarks.push(format!("breath response {response}"));
     remarks.extend(head.remarks());
     if let Some((participant, ..)) = knob.study() {
         let seed = knob.seed.value();
