@@ -275,7 +275,7 @@ fn arming_with_the_usual_feel_works_and_more_than_250_mnm_needs_an_answer() {
 fn a_knob_that_lets_go_by_itself_is_a_failure() {
     let (_alone, directory) = (alone(), tempfile::tempdir().unwrap());
     let knob = PtyKnob::plug(None, &Setup::default());
-    let mut command = chalumeau(&directory, &knob.path, "knob", &["--arm", "60", "--seconds", "3"]);
+    let mut command = chalumeau(&directory, &knob.path, "knob", &["--arm", "60", "--seconds", "6"]);
     let child = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
     armed(&knob);
     knob.faults.reboot.store(true, Ordering::Relaxed);
