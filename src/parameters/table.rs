@@ -168,7 +168,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("legato", BREATH, "Legato", number([5.0, 15.0], 8.0, 1, " ms"))
         .help(
             "Time in which the fingers move between slurred notes",
-            "Holes open and close over this time. In a long slur the notes between speak as well. Where the breath response is Played, slurs up into a higher register take half of this time, slurs down into a lower one nearly three times as long, and leaps of more than an octave into the low chalumeau as long as it says.",
+            "Holes open and close over this time. In a long slur the notes between speak as well. Where the breath response is Played, slurs up into a higher register take half of this time, and slurs down over the break three to four times as long; leaps of more than an octave into the low chalumeau take just this time.",
             "The torque changes from one note's curve to the next note's.",
         )
         .sets(Sets::Number(SettingNumber::LegatoMs))

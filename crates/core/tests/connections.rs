@@ -25,6 +25,7 @@ const COMPASS: (u8, u8) = (52, 84);
 /// Lowest written note of the clarion, B4.
 const CLARION: u8 = 71;
 
+/// An instrument that is played, by written notes.
 struct Played<'a> {
     model: &'a Arc<Model>,
 }

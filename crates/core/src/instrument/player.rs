@@ -490,6 +490,7 @@ impl Player {
         (1e-3 * f64::from(self.settings.legato_ms) / self.tick_s(model)).round() as u32
     }
 
+    /// Moves the fingers one after another within `ticks` control ticks, as a walk has them.
     fn walk<F: Real>(
         &mut self,
         fingering: usize,

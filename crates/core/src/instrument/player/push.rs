@@ -10,7 +10,7 @@ use crate::maths;
 /// Time in which a push rises, periods of the new note. Measured: at 0.25, 0.5 and 1, nine tenths of the holes of slurs down over the break are 5.8,
 /// 6.1 and 7.2 dB deep. An abrupt one clicks by 13 dB.
 const RISE_PERIODS: f64 = 0.35;
-/// Time constants after which nothing is left.
+/// Time constants after which it ends: what is left is less than 0.02 % of the pressure.
 const LASTS: f64 = 8.0;
 
 /// A push of the breath.
