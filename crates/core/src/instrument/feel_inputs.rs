@@ -2,7 +2,7 @@
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::haptics::{PlayedReed, RequirementSolver};
-use crate::instrument::lip::damped;
+use crate::instrument::lip::held;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 
@@ -15,7 +15,7 @@ pub fn played_reed(file: &InstrumentFile, a4_hz: f64, settings: &Settings) -> Pl
     let lips = file
         .fingerings
         .iter()
-        .map(|fingering| damped(sounding_hz(fingering.written), lowest_hz, f64::from(settings.damping)))
+        .map(|fingering| held(sounding_hz(fingering.written), lowest_hz, settings.hold()))
         .collect();
     PlayedReed {
         law: settings.reed_law(),

@@ -4,6 +4,7 @@ use crate::bore::lattice::JET_LOSS_REFERENCE;
 use crate::event::{Fingerings, SettingNumber};
 use crate::instrument::articulation::Articulation;
 use crate::instrument::concert_pitch::A4_RANGE_HZ;
+use crate::instrument::lip::Hold;
 use crate::instrument::listening::Listening;
 use crate::instrument::player::Attack;
 use crate::instrument::player::dynamics::LipShape;
@@ -222,6 +223,16 @@ impl Settings {
         let h = (set_h * f64::from(settings.lip)).clamp(0.5, 10.0);
         let k = (set_k * stiffer).clamp(0.01, 20.0);
         ReedLaw::free(h, k, f64::from(settings.reed_a)).unwrap_or_default()
+    }
+
+    /// How the player holds this reed. Real-time safe.
+    pub fn hold(&self) -> Hold {
+        // Of two numbers of one kind, the same for the default reed to the bit.
+        let power = |settings: &Self| {
+            let law = settings.reed_law();
+            law.closing() * law.flow_strength(f64::from(settings.zeta))
+        };
+        Hold { damping: f64::from(self.damping), power: power(self) / power(&Self::default()) }
     }
 
     /// A number by its name, as [`Event::Set`](crate::event::Event::Set) has it; not clamped. Real-time safe.

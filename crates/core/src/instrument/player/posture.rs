@@ -13,13 +13,13 @@ use super::step_towards;
 use super::technique::subtone::{at_place, covered};
 use super::voicing;
 use crate::instrument::bend::{self, BendSplit};
-use crate::instrument::lip::{damped, embouchure};
+use crate::instrument::lip::{embouchure, held};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::settings::{BreathResponse, Settings, Tuning};
 use crate::maths;
 use crate::reed::physical::ZETA_REFERENCE;
-use crate::reed::{Lip, MovingReed, ReedCoeffs, ReedLaw};
+use crate::reed::{MovingReed, ReedCoeffs, ReedLaw};
 use crate::units::{Air, cents};
 
 /// Each of two time constants with which the lip goes to the closing pressure that a note has between the softest and the loudest dynamic, s:
@@ -168,13 +168,13 @@ impl Posture {
     pub fn new(settings: &Settings, fingered: &Fingered, tick_s: f64, model: &Model) -> Self {
         let Fingered { fingering, alternate_cents, bend_cents, subtone, follows } = *fingered;
         let (note_hz, lowest_hz) = (model.notes_hz[fingering], model.size_hz);
-        let lip = embouchure(note_hz, lowest_hz);
+        let held = held(note_hz, lowest_hz, settings.hold());
         let free = MovingReed {
             law: settings.reed_law(),
             zeta: f64::from(settings.zeta),
             lay: f64::from(settings.lay),
-            resonance_hz: lip.resonance_hz,
-            damping: damped(note_hz, lowest_hz, f64::from(settings.damping)).damping,
+            resonance_hz: held.resonance_hz,
+            damping: held.damping,
             swept_s: model.swept_s,
         };
         let place = model.place(fingering);
@@ -187,7 +187,7 @@ impl Posture {
         let played = match response {
             BreathResponse::Physical => None,
             BreathResponse::Played => {
-                Some(Played::new(settings, &free, lip, subtone, (fingering, placed, rows_per_cent), model))
+                Some(Played::new(settings, &free, subtone, (fingering, placed, rows_per_cent), model))
             }
         };
         // The trims know the reference reed; with another, the player corrects what it takes off.
@@ -310,13 +310,14 @@ impl Played {
     fn new(
         settings: &Settings,
         free: &MovingReed,
-        lip: Lip,
         subtone: f64,
         (fingering, placed, rows_per_cent): (usize, PlacedRule, f64),
         model: &Model,
     ) -> Self {
         let note = model.tuning.notes.get(fingering).map_or_else(PlayedNote::default, |note| note.played);
+        let note_hz = model.notes_hz[fingering];
         // The reed that the note was played with.
+        let lip = embouchure(note_hz, model.size_hz);
         let reference = Settings::default();
         let known = MovingReed {
             law: ReedLaw::default(),
@@ -330,7 +331,6 @@ impl Played {
             && settings.reed_law() == reference.reed_law()
             && [settings.zeta, settings.lay, settings.damping]
                 == [reference.zeta, reference.lay, reference.damping];
-        let note_hz = model.notes_hz[fingering];
         let bore_slope = model.susceptance_slopes[fingering];
         let [own, reference] = [(free, subtone), (&known, 0.0)].map(|(reed, subtone)| {
             move |dynamic: f64| reed_at_note(&shaped(reed, subtone, placed.lip(dynamic)), note_hz)
