@@ -255,6 +255,8 @@ impl Chalumeau {
         }
         if let Some(instrument) = &mut self.instrument {
             instrument.reset();
+            // What linked controllers have said to single players is forgotten, too.
+            instrument.set_settings(&self.settings);
         }
     }
 
@@ -360,11 +362,12 @@ impl Chalumeau {
             presets.handle().wait();
         }
         let own = self.params.settings();
-        self.inputs.set_links(&self.params.links.links(&own));
+        let are_retied = self.inputs.set_links(&self.params.links.links(&own));
         // Where a linked controller has spoken last, its value counts.
         let settings = self.inputs.linked(own);
         self.inputs.set_curves(self.params.curves.now(&settings));
-        let has_changed = settings != self.settings;
+        // A link that is gone may have left its value with a player who is not the first.
+        let has_changed = are_retied || settings != self.settings;
         if has_changed {
             instrument.set_settings(&settings);
             if settings.players != self.settings.players {
@@ -429,6 +432,7 @@ impl Chalumeau {
         }
         inputs.bend_range(self.params.instrument.bend_range.value());
         inputs.wheel(self.params.expression.wheel.value().into(), drives);
+        inputs.reed_sources(drives);
         inputs.key_switches(settings.reach.key_switches);
         let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
         keys.into_iter().flatten().for_each(|event| inputs.window_key(event));

@@ -1412,7 +1412,7 @@ fn a_parameter_of_the_measured_reed_is_the_plugins_on_every_instrument() {
         fs::read(d.path().join("x.wav")).unwrap()
     };
     // What the parameter has by itself, as on a B flat clarinet.
-    assert!(rendered("rface=physical") == rendered("ropen=0.5"));
+    assert!(rendered("rface=measured") == rendered("ropen=0.5"));
 }
 
 #[test]

@@ -28,8 +28,8 @@ Examples:
 /// is shut, own the share of power at the note's frequency, near 0 where another register sounds in its place. Comments say where the
 /// note begins, the reed shuts for a part of each period, the note chokes (or gives way to another register), returns and ends. Up and down differ because a moving breath
 /// passes a threshold before the note has grown or died. If the difference does not shrink with more --seconds, it is true
-/// hysteresis. On a curved facing the reed shuts later than `report` and
-/// the plugin say that it beats: they calculate that for a straight one (--lay 0).
+/// hysteresis. Where the reed beats, by `report` and the plugin, is calculated for a
+/// straight facing (--lay 0). On a curved one it shuts only at a higher pressure.
 ///
 /// The linear threshold among the comments is that of `chalumeau threshold`: the theory of a reed without inertia. As the reed has inertia,
 /// some high notes, such as C6, begin below it.

@@ -60,7 +60,7 @@ pub struct FeelArgs {
     /// Angle at which the reference reed closes on the reference note, degrees, 120..1080 [default: 360]
     #[arg(long, value_name = "DEG", value_parser = |s: &str| inside(s, FeelDesign::TRAVEL_DEG))]
     travel: Option<f64>,
-    /// Height of the mark at the threshold, mNm, 0..100 [default: 9 under flow, 6 under pressure]
+    /// Height of the mark (flow law) or the step (pressure law) at the threshold, mNm, 0..100 [default: 9 under flow, 6 under pressure]
     #[arg(long, value_name = "MNM", value_parser = |s: &str| inside(s, FeelDesign::MARK_MNM))]
     detent: Option<f64>,
 }

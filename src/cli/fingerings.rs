@@ -28,7 +28,8 @@ Examples:
 /// of the chart is always listed, last if it is not among the best.
 ///
 /// Columns of a note:
-/// fingers: keys and holes that the hands press, T thumb, L left, R right; empty where only the chart knows how;
+/// fingers: keys and holes that the hands press, T thumb, L1 to L3 and R1 to R3 the fingers of the left and the right hand, R alone the
+/// register key, A the A key; empty where only the chart knows how;
 /// hz, cents: its resonance with the air that moves with the reed, and how far that is from the note. A played note lies some 20 to 60
 /// cents lower; the difference from the fingering of the chart is what one hears;
 /// gamma_on: the mouth pressure at which it begins, over the closing pressure of the reed;

@@ -91,7 +91,7 @@ pub struct KnobCommand {
     /// End this long after the knob has answered, s; one that does not answer ends the command after 10 s
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.1, 86_400.0))]
     seconds: Option<f64>,
-    /// Write the take to this CSV file when done
+    /// Write the take to this CSV file when done; needs --seconds
     #[arg(long, value_name = "FILE", requires = "seconds")]
     record: Option<PathBuf>,
     /// Replace an existing file

@@ -58,6 +58,12 @@ impl PresetsCommand {
         for broken in &user.broken {
             say!("warning: {broken}");
         }
+        let hides = |own: &&Preset| factory::all().iter().any(|other| other.name == own.name);
+        for Preset { name, .. } in user.presets.iter().filter(hides) {
+            say!(
+                "warning: your preset {name:?} hides the factory preset of that name; change its name to have both"
+            );
+        }
         match &self.command {
             PresetsSubcommand::List(command) => command.run(&user),
             PresetsSubcommand::Show(command) => {

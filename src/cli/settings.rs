@@ -535,8 +535,8 @@ mod tests {
         let by_flag = read(&["--reed-stiffness", "2000"]).unwrap();
         assert_ne!(by_flag, Settings::default());
         assert_eq!(read(&["--set", "rstiff=2000 N/m"]), Ok(by_flag));
-        assert_eq!(read(&["--set", "rstiff=2000", "--set", "rface=physical"]), Ok(by_flag));
-        assert!(!read(&["--set", "rface=physical"]).unwrap().coupled);
+        assert_eq!(read(&["--set", "rstiff=2000", "--set", "rface=measured"]), Ok(by_flag));
+        assert!(!read(&["--set", "rface=measured"]).unwrap().coupled);
         assert_eq!(read(&["--set", "rface=dimensionless"]), Ok(Settings::default()));
     }
 

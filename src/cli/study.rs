@@ -14,7 +14,7 @@ Examples:
 /// Print the order of trials of a listening and touch study
 ///
 /// Sixteen trials compare a reed whose stiffness k follows its opening H (coupled, peak flow stays 1) with one whose k
-/// stays (free), as sides A and B of the plugin's A/B switch, both in sound and in feel. Participant and seed fix the
+/// stays (free), as sides A and B of the plugin's parameter *Study side*, both in sound and in feel. Participant and seed fix the
 /// order. The plugin's parameters Participant, Study seed and Trial select the same order. Do not show the table to the
 /// participant: it says which side is which.
 #[derive(Args)]

@@ -185,7 +185,7 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         balance_db(&heard.harmonics_db).map_or_else(|| "\u{2013}".to_owned(), |db| format!("{db:+.0} dB"));
     let text = format!("odd over even harmonics {balance}");
     ui.label(egui::RichText::new(text).color(c.quiet)).on_hover_text(
-        "Power of harmonics 1, 3, 5 ... over the power of harmonics 2, 4, 6 ...: 10 to 25 dB for a low clarinet, most when it is soft; about 0 dB for a saxophone",
+        "Power of harmonics 1, 3, 5 ... over the power of harmonics 2, 4, 6 ...: 14 to 28 dB for a low note of a clarinet, most when it is soft; about 0 dB for a saxophone",
     );
     choice(ui, hands, "tune");
     slider(ui, hands, "a4");

@@ -552,7 +552,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .setup()
         .act()
         .only(InUse::InStudy),
-    entry("side", KNOB, "A/B", switch(false, ["A", "B"])).help("Side A or B of the trial", "", "").act(),
+    entry("side", KNOB, "Study side", switch(false, ["A", "B"])).help("Side A or B of the trial", "", "").act(),
     entry("hsrc", KNOB, "H from", choice(REED_SOURCES))
         .help("What drives H", "A controller opens the reed, in the sound and under the hand. Its stiffness k stays.", "")
         .setup(),
@@ -618,7 +618,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .setup()
         .act()
         .never_restored(),
-    entry("rface", PHYSICAL_REED, "Reed description", choice(&[("seed", "Dimensionless"), ("phys", "Physical")]))
+    entry("rface", PHYSICAL_REED, "Reed description", choice(&[("seed", "Dimensionless"), ("phys", "Measured")]))
         .help(
             "How the reed is given: as dimensionless H, k and zeta, or as a maker measures it",
             "Both describe the same reed. The values that are shown are in use.",

@@ -63,7 +63,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("part", "Knob", "Participant", "1", false),
     ("seed", "Knob", "Study seed", "1", false),
     ("trial", "Knob", "Trial", "1", false),
-    ("side", "Knob", "A/B", "A", true),
+    ("side", "Knob", "Study side", "A", true),
     ("hsrc", "Knob", "H from", "Parameter", false),
     ("ksrc", "Knob", "k from", "Parameter", false),
     ("kstat", "Knob", "Knob status", "off", false),

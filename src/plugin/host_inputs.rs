@@ -144,9 +144,9 @@ impl HostInputs {
         found
     }
 
-    /// Ties controllers to settings.
-    pub fn set_links(&mut self, links: &[Option<Link>; MOST]) {
-        self.translator.set_links(links);
+    /// Ties controllers to settings, and says whether they were tied in another way.
+    pub fn set_links(&mut self, links: &[Option<Link>; MOST]) -> bool {
+        self.translator.set_links(links)
     }
 
     /// Gives sources their own curves.
@@ -273,6 +273,13 @@ impl HostInputs {
     pub fn wheel(&mut self, wheel: Wheel, drives: [ReedSource; 2]) {
         let is_reeds = drives.contains(&ReedSource::Wheel);
         for &event in self.translator.wheel(if is_reeds { Wheel::Nothing } else { wheel }) {
+            push(&mut self.events, event);
+        }
+    }
+
+    /// Lets what `drives` H and k now act from the beginning of the block on.
+    pub fn reed_sources(&mut self, drives: [ReedSource; 2]) {
+        for event in self.reeds.changed(drives, self.translator.parts()) {
             push(&mut self.events, event);
         }
     }
@@ -485,6 +492,36 @@ mod tests {
         assert_eq!(inputs.linked(own).techniques.growl, 0.4, "moved by hand");
         midi(&mut inputs, NO_REED, &[[0xB0, 21, 0]]);
         assert_eq!(inputs.linked(own).techniques.growl, 0.0);
+    }
+
+    #[test]
+    fn a_link_that_goes_says_so_though_only_another_player_had_its_value() {
+        let links = ControllerLinks::default();
+        let growl = crate::parameters::find("growl").unwrap();
+        links.replace(&[ParameterLink::whole(Source::Controller(21), growl).unwrap()]);
+        let (mut inputs, own) = (HostInputs::default(), Settings::default());
+        inputs.begin_block(2);
+        assert!(inputs.set_links(&links.links(&own)));
+        parted(&mut inputs, NO_REED, &MPE);
+        let said = parted(&mut inputs, NO_REED, &[[0x91, 60, 100], [0x92, 64, 100], [0xB2, 21, 127]]);
+        assert!(matches!(said[..], [.., (To::Player(1), Event::Set(_, 1.0))]), "{said:?}");
+        assert!(!inputs.set_links(&links.links(&own)));
+        assert_eq!(inputs.linked(own), own, "the first player has heard nothing");
+        links.replace(&[]);
+        assert!(inputs.set_links(&links.links(&own)));
+    }
+
+    #[test]
+    fn a_reed_that_no_controller_drives_any_more_goes_back_at_once() {
+        let driven = [ReedSource::Wheel, ReedSource::Parameter];
+        let mut inputs = HostInputs::default();
+        midi(&mut inputs, driven, &[[0x90, 60, 100], [0xB0, 1, 127]]);
+        inputs.begin_block(1);
+        inputs.reed_sources(driven);
+        assert_eq!(midi(&mut inputs, driven, &[]), [], "nothing has changed");
+        inputs.begin_block(1);
+        inputs.reed_sources(NO_REED);
+        assert_eq!(midi(&mut inputs, NO_REED, &[]), [Event::Reed { h: 1.0, k: 1.0 }]);
     }
 
     #[test]

@@ -116,8 +116,8 @@ impl EventTranslator {
     }
 
     /// See [`Parts::set_links`].
-    pub fn set_links(&mut self, links: &[Option<Link>; MOST]) {
-        self.midi.set_links(links);
+    pub fn set_links(&mut self, links: &[Option<Link>; MOST]) -> bool {
+        self.midi.set_links(links)
     }
 
     /// See [`Parts::links`].

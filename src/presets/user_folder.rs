@@ -236,7 +236,16 @@ fn check_file(path: &Path) -> Result<(), String> {
 /// A name as files have it.
 fn stem(name: &str) -> String {
     let plain = |c: char| if c.is_alphanumeric() { c.to_lowercase().next().unwrap_or(c) } else { '_' };
-    name.chars().map(plain).collect()
+    let mut stem: String = name.chars().map(plain).collect();
+    // Windows keeps these names for devices, whatever follows the dot.
+    let is_port = |kind| {
+        stem.strip_prefix(kind)
+            .is_some_and(|number| number.len() == 1 && number.as_bytes()[0].is_ascii_digit())
+    };
+    if ["con", "prn", "aux", "nul"].contains(&stem.as_str()) || is_port("com") || is_port("lpt") {
+        stem.push('_');
+    }
+    stem
 }
 
 /// By which names a user may look for a file that is no preset, in lower case: its own, and that in its line `name`.
@@ -273,6 +282,14 @@ mod tests {
             found.favourites.contains("Jazz")
                 && found.broken.iter().any(|told| told.contains("is not a file"))
         );
+    }
+
+    #[test]
+    fn no_file_has_the_name_of_a_device() {
+        for (name, file) in [("Aux", "aux_"), ("COM1", "com1_"), ("Con brio", "con_brio"), ("Com10", "com10")]
+        {
+            assert_eq!(stem(name), file);
+        }
     }
 
     #[test]

@@ -227,6 +227,8 @@ impl Args {
         let (backends, output) = match &chosen.output {
             _ if names_a_place => (self.backends(), self.output_device.clone()),
             OutputChoice::Auto => (self.backends(), None),
+            // JACK has no MIDI input by a name of the system.
+            OutputChoice::Jack if self.midi_input.is_some() => (self.backends(), None),
             OutputChoice::Jack => (vec![Backend::Jack], None),
             OutputChoice::System => (vec![SYSTEM], None),
             OutputChoice::Device(name) => (vec![SYSTEM], Some(name.clone())),
@@ -484,6 +486,10 @@ mod tests {
             (Some("Other"), 44_100.0, 256)
         );
         assert_eq!(args(&["--midi-input", "Keys"]).attempts(&kept)[0].midi_input.as_deref(), Some("Keys"));
+        let on_jack = DeviceChoice { output: OutputChoice::Jack, ..kept.clone() };
+        assert_eq!(args(&[]).attempts(&on_jack)[0].backend, Backend::Jack);
+        let keys = &args(&["--midi-input", "Keys"]).attempts(&on_jack)[0];
+        assert_eq!((keys.backend, keys.midi_input.as_deref()), (SYSTEM, Some("Keys")));
         assert!(
             args(&["--backend", "dummy"]).attempts(&kept).iter().all(|one| one.backend == Backend::Dummy)
         );

@@ -247,7 +247,7 @@ fn every_slider_drags_types_and_resets() {
     window.harness.run();
     drags_types_and_resets(&mut window, "detent");
     let mut window = Window::tall(Tab::Reed);
-    window.harness.get_by_label("Reed description: Physical").click();
+    window.harness.get_by_label("Reed description: Measured").click();
     window.harness.run();
     MAKER_SLIDERS.iter().for_each(|id| drags_types_and_resets(&mut window, id));
     let mut window = Window::tall(Tab::Sound);
@@ -456,7 +456,7 @@ fn h_and_k_are_taken_by_the_hand() {
 #[test]
 fn a_makers_reed_is_taken_by_the_hand() {
     let mut window = Window::tall(Tab::Reed);
-    window.harness.get_by_label("Reed description: Physical").click();
+    window.harness.get_by_label("Reed description: Measured").click();
     window.harness.run();
     let (peak, closure) = ("Peak of the flow: w", "Closure of the reed: K");
     let at = |window: &Window, name: &str| window.harness.get_by_label(name).rect().center();

@@ -27,8 +27,10 @@ const SLOWED_HZ = 1.5;
 /** Light over a cylinder from its upper edge to its lower edge: 1 is the colour itself. */
 const LIGHT = [[-1, 0.62], [-0.8, 0.98], [-0.5, 1.32], [-0.3, 1.16], [0, 0.96], [0.4, 0.76], [0.8, 0.56], [1, 0.46]];
 
+/** Line of the caption, below the buttons, pixels. */
+const CAPTION_Y = 62;
 /** What the wave is, the room that the name of the note takes beside it, and the stage that is too narrow for it, pixels. */
-const [CAPTION, NOTE_WIDTH, LEAST_CAPTIONED] = ['sound pressure in the bore', 90, 280];
+const [CAPTION, NOTE_WIDTH, LEAST_CAPTIONED] = ['sound pressure in the bore', 90, 480];
 
 const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const lit = (colour, light) => colour.map((x) => Math.round(light > 1 ? x + (255 - x) * Math.min(1, light - 1) : x * light));
@@ -351,10 +353,10 @@ export class ClarinetDrawing {
     g.lineJoin = 'round';
     g.stroke(line);
     g.font = '12px system-ui, sans-serif';
-    // Not under the name of the note, nor under the buttons, which are above on the narrowest phones.
-    if (room > 70 && this.width > LEAST_CAPTIONED && this.left + 2 + g.measureText(CAPTION).width < this.width - NOTE_WIDTH) {
+    // Not under the name of the note, and below the buttons.
+    if (room > CAPTION_Y + 56 && this.width > LEAST_CAPTIONED && this.left + 2 + g.measureText(CAPTION).width < this.width - NOTE_WIDTH) {
       g.fillStyle = css(this.c.breath);
-      g.fillText(CAPTION, this.left + 2, 14);
+      g.fillText(CAPTION, this.left + 2, CAPTION_Y);
     }
   }
 

@@ -75,6 +75,12 @@ export class Control {
     this.show();
   }
 
+  /** Name and meaning, for a list of terms. */
+  explained() {
+    const part = (kind, textContent) => Object.assign(document.createElement(kind), { textContent });
+    return [part('dt', this.element.getAttribute('aria-label')), part('dd', this.element.title)];
+  }
+
   share(value) {
     return (value - this.of.min) / (this.of.max - this.of.min);
   }

@@ -4,9 +4,9 @@
 const SAID_MS = 6000;
 
 export class Hint {
-  /** `usual` gives what to say where nothing has happened. */
-  constructor(element, usual) {
-    Object.assign(this, { element, usual, failure: '', said: '' });
+  /** `usual` gives what to say where nothing has happened, and `urgent` what goes before all but a failure, or ''. */
+  constructor(element, usual, urgent) {
+    Object.assign(this, { element, usual, urgent, failure: '', said: '' });
   }
 
   /** There is no sound. Said until some is made. */
@@ -34,7 +34,7 @@ export class Hint {
   tell() {
     const { element, failure, said } = this;
     element.classList.toggle('failed', failure !== '');
-    const text = failure || said || this.usual();
+    const text = failure || this.urgent() || said || this.usual();
     if (element.textContent !== text) element.textContent = text;
   }
 }

@@ -19,6 +19,8 @@ const HINT = matchMedia('(hover: none)').matches
   ? 'Drag a hole along the bore. Its width is the second number.'
   : 'Drag a hole along the bore. With Shift, up makes it wider.';
 const get = (id) => document.getElementById(id);
+/** What is wrong with a file, without the excerpt that a parser shows. */
+const inShort = (reason) => reason.replace(/TOML parse error at line (\d+)[^]*/, 'Line $1 is not understood.');
 const bytes = (text) => new TextEncoder().encode(text);
 
 export class Holes {
@@ -63,7 +65,13 @@ export class Holes {
     this.workshop.long?.end();
     get('hole').replaceChildren(...built.holes.map(({ name, says }, at) => new Option(says || name.replaceAll('_', ' '), at)));
     this.state(HINT);
-    this.choose(null);
+    this.choose(this.isOpen ? this.usual : null);
+  }
+
+  /** The hole whose numbers are shown before one is chosen. */
+  get usual() {
+    const { holes } = this.built;
+    return holes.length > 0 ? Math.max(0, holes.findIndex(({ kind }) => kind === 'finger')) : null;
   }
 
   /** What the sound depends on, for other questions. */
@@ -83,9 +91,7 @@ export class Holes {
     this.drag.isOff = isOpen;
     get('holes').setAttribute('aria-pressed', isOpen);
     get('hole-panel').hidden = !isOpen;
-    if (isOpen && this.chosen === null && this.built.holes.length > 0) {
-      this.choose(Math.max(0, this.built.holes.findIndex(({ kind }) => kind === 'finger')));
-    }
+    if (isOpen && this.chosen === null) this.choose(this.usual);
     this.draw();
     this.on({ isOpen });
   }
@@ -156,7 +162,7 @@ export class Holes {
     const said = this.outside('place', place, this.room()) ?? this.outside('width', width, this.widths(place / 1e3));
     if (said) {
       this.draw(true);
-      this.state(said);
+      this.state(said, true);
       return;
     }
     this.remember();
@@ -269,7 +275,7 @@ export class Holes {
   }
 
   fail(what, error) {
-    this.state(error instanceof NotLoaded ? error.message : `${what}: ${error.message}`);
+    this.state(error instanceof NotLoaded ? error.message : `${what}: ${error.message}`, true);
   }
 
   take({ file, prepared, holes }, isFitted, isLatest) {
@@ -291,11 +297,13 @@ export class Holes {
 
   /** What a worker has prepared does not fit the sound. */
   refuse() {
-    this.state('The moved holes are not heard. Reload the page to try again.');
+    this.state('The moved holes are not heard. Reload the page to try again.', true);
   }
 
-  state(text) {
-    get('hole-state').textContent = text;
+  /** `details` are for who points at the text. */
+  state(text, hasFailed = false, details = '') {
+    Object.assign(get('hole-state'), { textContent: text, title: details });
+    get('hole-state').classList.toggle('failed', hasFailed);
   }
 
   save() {
@@ -313,7 +321,7 @@ export class Holes {
     if (!file) return;
     if (!this.isOpen) this.show(true);
     if (/\.toml$/i.test(file.name)) this.open(file);
-    else this.state(`${file.name} is not opened. A Chalumeau instrument file ends in .toml.`);
+    else this.state(`${file.name} is not opened. A Chalumeau instrument file ends in .toml.`, true);
   }
 
   async open(file) {
@@ -324,7 +332,8 @@ export class Holes {
       this.state('');
       this.on({ opened: told });
     } catch (error) {
-      this.state(error instanceof NotLoaded ? error.message : `${file.name} is not opened. ${error.message}`);
+      if (error instanceof NotLoaded) this.state(error.message, true);
+      else this.state(`${file.name} is not opened. ${inShort(error.message)}`, true, error.message);
     }
   }
 }

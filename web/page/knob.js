@@ -174,14 +174,17 @@ export class Knob {
 
   async changeSpeed(baudRate) {
     const { port } = this;
-    if (!port) return;
-    this.opened += 1;
+    if (!port || this.changing) return;
+    const opened = (this.opened += 1);
+    this.changing = this.shut().then(() => this.openAt(port, baudRate));
     try {
-      await this.shut();
-      await this.openAt(port, baudRate);
-      this.read(port, this.opened);
+      await this.changing;
+      // Who disconnects meanwhile waits, and shuts the port.
+      if (opened === this.opened) this.read(port, opened);
     } catch (error) {
-      this.lose(error.message);
+      if (opened === this.opened) this.lose(error.message);
+    } finally {
+      this.changing = null;
     }
   }
 
@@ -216,6 +219,8 @@ export class Knob {
     this.opened += 1;
     this.free(STOPPED);
     this.write(this.farewell, true);
+    // While its speed changes the port is neither open nor shut.
+    await this.changing?.catch(() => {});
     await this.shut();
     this.lose('');
   }

@@ -1,13 +1,15 @@
 // The listening page: each sound is made by the module when it is first asked for, much faster than it sounds, and drawn.
 
 import { Kept } from './kept.js';
-import { json } from './names.js';
+import { clamp, json } from './names.js';
 import { compiled, gainOfShare, whySilent } from './sound.js';
 
 /** Time in which a sound that is stopped fades, s. */
 const FADE_S = 0.02;
 /** Columns of a picture. */
 const COLUMNS = 360;
+/** Range of its height, dB below full scale. */
+const RANGE_DB = 48;
 const get = (id) => document.getElementById(id);
 const tour = await json('tour.json').catch((error) => {
   get('trouble').textContent = `No sound: ${error.message}`;
@@ -145,7 +147,8 @@ function follow(own, canvas) {
     const share = playing === own ? (context.currentTime - own.began) / own.stop.sound.duration : 0;
     g.clearRect(0, 0, canvas.width, canvas.height);
     own.stop.peaks.forEach((peak, n) => {
-      const height = Math.max(1, peak * canvas.height);
+      // In dB, so that the softest scale is seen, too.
+      const height = Math.max(1, clamp(1 + 20 * Math.log10(peak + 1e-9) / RANGE_DB, 0, 1) * canvas.height);
       g.fillStyle = n / COLUMNS < share ? heard : ahead;
       g.fillRect((n * canvas.width) / COLUMNS, (canvas.height - height) / 2, Math.max(1, canvas.width / COLUMNS - 0.5), height);
     });

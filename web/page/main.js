@@ -8,6 +8,7 @@ import { Hands } from './hands.js';
 import { Hint } from './hint.js';
 import { Holes } from './holes.js';
 import { Keyboard } from './keyboard.js';
+import { Knob } from './knob.js';
 import { KnobPanel } from './knob-panel.js';
 import { Meter } from './meter.js';
 import { Midi } from './midi.js';
@@ -29,18 +30,18 @@ const REST_S = 120;
 const WAKE_MS = 700;
 const KNOB = 'the knob';
 /** Controllers of MIDI that blow. */
-const BLOWING = ['CC2', 'CC11', 'channel pressure'];
+const BLOWING = ['CC2', 'CC11', 'channel pressure', 'the note'];
 const LOADING = 'Loading …';
 /** Without a mouse, a browser switches the sound on when the first finger is lifted. */
 const HAS_MOUSE = !matchMedia('(hover: none)').matches;
-const IDLE = 'Press a key, or drag across the clarinet. To blow, press Blow.';
+const IDLE = `Press a key, or drag across the clarinet.${HAS_MOUSE ? '' : ' Slide up to play louder.'} To blow, press Blow.`;
 const CHOOSE = 'Choose a note: press a key, or drag across the clarinet.';
 
 /** Least time between two notes that a screen reader is told, ms. */
 const ANNOUNCED_MS = 500;
 
 const get = (id) => document.getElementById(id);
-const hint = new Hint(get('hint'), usual);
+const hint = new Hint(get('hint'), usual, () => (room?.calibrating ? 'Measuring the room for two seconds. Please be quiet …' : ''));
 let values = [];
 /** The sound is there; it should be on and is not. */
 let [isPrepared, isLate, waking, isTouching] = [false, false, 0, false];
@@ -54,11 +55,13 @@ const drawing = new ClarinetDrawing(get('clarinet'));
 const meter = new Meter(data.dynamics, data.struck);
 const engine = new Engine(hear);
 const hands = new Hands((message) => engine.send(message));
-const keyboard = new Keyboard(get('keyboard'), hands, breathe);
+const keyboard = new Keyboard(get('keyboard'), hands, breathe, ([below, above]) => {
+  [get('lower').disabled, get('higher').disabled] = [!below, !above];
+});
 const drag = new Drag(get('clarinet'), hands, breathe, (touches) => {
   drawing.touch(touches.map(({ x, y, note }) => ({ x, y, name: noteName(note + instrument.transposition) })));
 });
-const typing = new Typing(hands, breathe, (said) => {
+const typing = new Typing(hands, (breath) => breathe(breath, 'arrow keys'), (said) => {
   if (said.letters) keyboard.setLetters(said.letters);
   if (said.help) tellKeys(said.help);
   if (said.outside !== undefined) {
@@ -91,7 +94,8 @@ const knob = new KnobPanel(engine, workshop, () => ({ ...holes.question(), value
 });
 values = [...data.defaults];
 let instrument = data.instruments[0];
-let isTouched = false;
+/** What holds the breath, where no device and no key does. */
+let touchedBy = '';
 let [blowing, isOpening] = [false, false];
 let [isChanged, isRestoring] = [false, false];
 
@@ -102,6 +106,12 @@ get('instrument').onchange = (event) => {
   leaveAfterPointer(event.target);
 };
 setInstrument(0);
+get('about').onclick = () => {
+  letGo();
+  get('help').showModal();
+};
+get('help').onclick = ({ target }) => target === get('help') && get('help').close();
+get('help-controls').append(...controls.flatMap((control) => control.explained()));
 get('lower').onclick = () => keyboard.shift(-1);
 get('higher').onclick = () => keyboard.shift(1);
 get('volume').oninput = (event) => {
@@ -139,11 +149,20 @@ function hide() {
   if (!blowing) hands.releaseAll();
 }
 
-/** A control, the instrument or a hole is no longer the preset's. */
+/** A control, the instrument or a hole has changed: it may no longer be the preset's, or be so again. */
 function change() {
-  presets.change();
-  isChanged = true;
+  isChanged = isOther();
+  if (isChanged) presets.change();
+  else presets.show();
   keep();
+}
+
+/** Whether the page has something else than the preset. */
+function isOther() {
+  const preset = presets.all[presets.at];
+  // A hand does not find the last digit again.
+  const isSame = ({ place, min, max, default: usual }) => Math.abs(values[place] - (preset.values[place] ?? usual)) < 1e-3 * (max - min);
+  return instrument !== data.instruments[preset.instrument] || holes.moved.length > 0 || !data.controls.every(isSame);
 }
 
 /** Keeps what the next visit shall find. */
@@ -214,7 +233,6 @@ function usual() {
       ? `${HAS_MOUSE ? 'Click' : 'Tap'} once to switch the sound on.`
       : `The browser does not switch the sound on. ${HAS_MOUSE ? 'Click' : 'Tap'} once; if that does not help, is there a loudspeaker?`;
   }
-  if (room?.calibrating) return 'Measuring the room for two seconds. Please be quiet …';
   if ((room || knob.plays) && !hands.hasNote) return CHOOSE;
   if (room) return 'Blow at the microphone as if to cool a spoon, with headphones on. A key or a drag chooses the note.';
   if (knob.plays) return 'Turn the knob to blow. A key or a drag chooses the note.';
@@ -222,9 +240,9 @@ function usual() {
 }
 
 /** Breath of hands on the screen or of arrow keys; null when they let go. The microphone's breath stays what it is. */
-function breathe(breath) {
-  if (blowing || (breath === null && !isTouched)) return;
-  isTouched = breath !== null;
+function breathe(breath, by = 'mouse or finger') {
+  if (blowing || (breath === null && touchedBy === '')) return;
+  touchedBy = breath === null ? '' : by;
   engine.send({ breath });
   midi.isTaken = true;
 }
@@ -366,7 +384,7 @@ function announce(text) {
 /** Where the breath comes from. */
 function breathing() {
   if (room) return room.calibrating ? 'Microphone' : 'Breath: microphone';
-  if (isTouched) return 'Breath: mouse or finger';
+  if (touchedBy) return `Breath: ${touchedBy}`;
   return origin && !(midi.isTaken && BLOWING.includes(origin)) ? `Breath: ${origin}` : 'Breath: keys';
 }
 
@@ -421,6 +439,8 @@ get('midi').onclick = () => {
   get('midi').title = '';
 };
 get('midi').hidden = !Midi.isHere;
+// A telephone has no serial port.
+get('knob').hidden = !HAS_MOUSE && !Knob.isHere;
 // Where it has been allowed before, nobody needs to ask again.
 navigator.permissions?.query({ name: 'midi' }).then(({ state }) => state === 'granted' && Midi.isHere && openMidi(), () => {});
 

@@ -3,11 +3,12 @@
 //
 // Of several pages in one browser the one that was looked at last plays: each would play every note.
 
-const [NOTE_OFF, NOTE_ON, CONTROLLER, PRESSURE] = [0x80, 0x90, 0xb0, 0xd0];
+const [NOTE_OFF, NOTE_ON, KEY_PRESSURE, CONTROLLER, PRESSURE] = [0x80, 0x90, 0xa0, 0xb0, 0xd0];
 const [BREATH, EXPRESSION, PEDAL, SOUND_OFF, EASE_CONTROLLERS, NOTES_OFF] = [2, 11, 64, 120, 121, 123];
 /** What may blow, as the picture's origins have it. */
 const NAMES = { [BREATH]: 'CC2', [EXPRESSION]: 'CC11' };
 
+const ofKey = (channel, key) => `the note ${channel} ${key}`;
 const idOf = (input) => input.id ?? input.name;
 
 export class Midi {
@@ -31,8 +32,18 @@ export class Midi {
     return 'requestMIDIAccess' in navigator;
   }
 
-  async open() {
-    this.access = await navigator.requestMIDIAccess();
+  /** A second opening waits for the first: two would play every note twice. */
+  open() {
+    this.opening ??= this.openOnce().finally(() => (this.opening = null));
+    return this.opening;
+  }
+
+  async openOnce() {
+    this.isWanted = true;
+    const access = await navigator.requestMIDIAccess();
+    // Meanwhile it was closed.
+    if (!this.isWanted || this.access) return;
+    this.access = access;
     this.access.onstatechange = () => this.listen();
     if (!document.hidden) this.claim();
     this.listen();
@@ -40,6 +51,7 @@ export class Midi {
 
   /** No device plays any more. */
   close() {
+    this.isWanted = false;
     [...this.inputs.keys()].forEach((input) => this.leave(input));
     this.inputs.clear();
     if (!this.access) return;
@@ -105,6 +117,7 @@ export class Midi {
       return;
     }
     if (kind === NOTE_OFF || kind === NOTE_ON) {
+      this.blown.delete(ofKey(channel, first));
       this.hands.release(first, input, channel);
       return;
     }
@@ -114,6 +127,8 @@ export class Midi {
       this.blown.set(`${name} ${channel}`, { name, message, value: kind === PRESSURE ? first : second, input });
       this.isTaken = false;
     }
+    // A key's own breath ends with the key.
+    if (kind === KEY_PRESSURE) this.blown.set(ofKey(channel, first), { name: 'the note', message, value: second, input });
     if (kind === CONTROLLER && (first === SOUND_OFF || first === NOTES_OFF)) this.hands.forget();
     this.send({ midi: message });
   }

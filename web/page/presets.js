@@ -47,10 +47,12 @@ export class Presets {
 
   fill() {
     const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const found = this.all.map((preset, at) => ({ ...preset, at })).filter(({ name, tags, shows }) => {
-      const text = `${name} ${tags.join(' ')} ${shows}`.toLowerCase();
-      return words.every((word) => text.includes(word));
-    });
+    const has = (text) => words.every((word) => text.toLowerCase().includes(word));
+    // Enter takes the first: names go before tags, and these before words that happen to be said.
+    const texts = ({ name, tags, shows }) => [name.toLowerCase().includes(words.join(' ')) ? name : '', name, `${name} ${tags.join(' ')}`, `${name} ${tags.join(' ')} ${shows}`];
+    const rank = (preset) => texts(preset).findIndex(has);
+    const found = this.all.map((preset, at) => ({ ...preset, at, rank: rank(preset) })).filter((preset) => preset.rank >= 0);
+    found.sort((a, b) => a.rank - b.rank || a.at - b.at);
     this.list.replaceChildren(...found.map((preset) => this.row(preset)));
     if (found.length === 0) this.list.append(Object.assign(document.createElement('li'), { textContent: 'No preset has all these words.', className: 'quiet' }));
   }

@@ -7,6 +7,9 @@ const CODES = ['KeyA', 'KeyW', 'KeyS', 'KeyE', 'KeyD', 'KeyF', 'KeyT', 'KeyG', '
 /** Step of the breath, and where it begins. */
 const [STEP, BEGIN] = [0.08, 0.66];
 
+/** The C nearest to ten semitones above the lowest note: letters begin there. */
+const usualBase = (first) => 12 * Math.round((first + 10) / 12);
+
 /** A list that is open takes the letters; one that is closed only has the focus, where the browser tells them apart. */
 const OPEN_LIST = CSS.supports('selector(:open)') ? 'select:open' : 'select';
 
@@ -29,9 +32,11 @@ export class Typing {
     }, () => {});
   }
 
+  /** The letters stay about where they are among the notes of the instrument. */
   setRange(first, last) {
+    const base = usualBase(first) + this.base - usualBase(this.first ?? first);
     [this.first, this.last] = [first, last];
-    this.moveTo(this.base);
+    this.moveTo(base);
   }
 
   moveTo(base) {

@@ -26,6 +26,8 @@ class Chalumeau extends AudioWorkletProcessor {
     this.blocks = 0;
     this.listening = false;
     this.wasOpen = false;
+    this.following = null;
+    this.waiting = [];
     this.score = null;
     this.hasKnob = false;
     this.pictures = 0;
@@ -60,12 +62,16 @@ class Chalumeau extends AudioWorkletProcessor {
       module.chalumeau_set(...message.set);
       module.chalumeau_settle();
     }
-    if ('instrument' in message) {
-      module.chalumeau_begin(sampleRate, message.instrument);
-      // It lies elsewhere now.
-      this.views = this.input = null;
+    // Notes that follow another instrument are for that one. A knob waits for nothing.
+    if (this.following && !message.knob && !message.knobBytes) {
+      this.waiting.push(message);
+      return;
     }
-    if (message.prepared) this.begin(message.prepared);
+    if ('instrument' in message || message.prepared) {
+      this.following = message;
+      module.chalumeau_leave();
+      if (module.chalumeau_has_left() === 1) this.follow();
+    }
     if (message.knob) this.turn(...message.knob);
     if (message.knobBytes && this.hasKnob) {
       this.give(message.knobBytes);
@@ -96,11 +102,21 @@ class Chalumeau extends AudioWorkletProcessor {
     return Uint8Array.from(new Uint8Array(this.module.memory.buffer, this.module.chalumeau_outbox(), length));
   }
 
+  /** Another instrument, once the one before is silent. */
+  follow() {
+    const { instrument, prepared } = this.following;
+    this.following = null;
+    if (prepared) this.begin(prepared);
+    else this.module.chalumeau_begin(sampleRate, instrument);
+    // It lies elsewhere now.
+    this.views = this.input = null;
+    this.waiting.splice(0).forEach((message) => this.take(message));
+  }
+
   /** An instrument that a worker has prepared. */
   begin({ file, prepared }) {
     this.give(file, prepared);
     const taken = this.module.chalumeau_begin_prepared(sampleRate, file.length) === 1;
-    this.views = this.input = null;
     this.port.postMessage({ taken });
   }
 
@@ -157,6 +173,7 @@ class Chalumeau extends AudioWorkletProcessor {
   }
 
   play(input, output) {
+    if (this.following && this.module.chalumeau_has_left() === 1) this.follow();
     this.hear(input);
     const frames = output[0].length;
     if (this.hasKnob) this.tend(frames);

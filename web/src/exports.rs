@@ -42,8 +42,26 @@ fn take_over(mut made: Playing) -> u32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn chalumeau_begin(rate_hz: f64, instrument: u32) -> u32 {
     let instrument = Bundled::ALL.get(instrument as usize).copied().unwrap_or_default();
-    let Ok(made) = Playing::new(rate_hz, instrument) else { return 0 };
+    let Ok(made) = Playing::new(rate_hz, instrument) else { return stay() };
     take_over(made)
+}
+
+/// What was to take over does not.
+fn stay() -> u32 {
+    with(Playing::stay);
+    0
+}
+
+/// Lets the instrument fall silent, for another to begin: making one takes some ten blocks.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_leave() {
+    with(Playing::leave);
+}
+
+/// 1 once it has, also where there is none.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_has_left() -> u32 {
+    locked().as_deref().is_none_or(Playing::has_left).into()
 }
 
 /// Most samples of one block.
@@ -211,7 +229,7 @@ pub extern "C" fn chalumeau_begin_prepared(rate_hz: f64, file: u32) -> u32 {
     let inbox = inbox();
     let texts = std::str::from_utf8(&inbox).ok().and_then(|text| text.split_at_checked(file as usize));
     let Some(made) = texts.and_then(|(file, prepared)| Playing::prepared(rate_hz, file, prepared)) else {
-        return 0;
+        return stay();
     };
     take_over(made)
 }
@@ -348,6 +366,8 @@ mod tests {
                 chalumeau_knob_zero();
                 chalumeau_knob_status();
                 chalumeau_outbox();
+                chalumeau_leave();
+                chalumeau_has_left();
                 let frames = chalumeau_process(a);
                 assert!(frames <= chalumeau_most_frames() && frames <= a);
                 chalumeau_picture();

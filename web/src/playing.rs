@@ -8,6 +8,7 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::control::midi::BreathOrigin;
 use chalumeau_core::control::midi::breath::{BreathController, BreathFrom};
 use chalumeau_core::control::midi::techniques::Wheel;
+use chalumeau_core::control::notes::{NoteAddress, NoteExpression};
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::control::wind::{WindCoeffs, WindDesign, WindMeter};
 use chalumeau_core::dsp::smooth::smooth_single;
@@ -86,6 +87,9 @@ const FADE_IN_S: f64 = 0.025;
 /// Time constant with which the last sample of the one before goes to 0, s.
 const FADE_OUT_S: f64 = 0.001;
 
+/// Time in which an instrument falls silent before another is made, s: making it takes some ten blocks, and what sounded until then would break off.
+const LEAVE_S: f64 = 0.005;
+
 /// One instrument takes over from another without a click.
 struct Takeover {
     /// Samples since then, and in which the new one fades in.
@@ -94,17 +98,38 @@ struct Takeover {
     /// What is left of the last samples of the one before, and its share after each sample.
     rest: [f32; 2],
     share: f32,
+    /// Samples in which the old one falls silent, and how many are left; `None` while it stays.
+    leave: usize,
+    leaving: Option<usize>,
 }
 
 impl Takeover {
     fn done(rate_hz: f64) -> Self {
         let fade = (FADE_IN_S * rate_hz) as usize;
         let share = maths::exp(-1.0 / (FADE_OUT_S * rate_hz)) as f32;
-        Self { played: fade, fade, rest: [0.0; 2], share }
+        let leave = ((LEAVE_S * rate_hz) as usize).max(1);
+        Self { played: fade, fade, rest: [0.0; 2], share, leave, leaving: None }
     }
 
     fn begin(&mut self, last: [f32; 2]) {
-        (self.played, self.rest) = (0, last);
+        (self.played, self.rest, self.leaving) = (0, last, None);
+    }
+
+    fn leave(&mut self, samples: usize) {
+        self.leaving.get_or_insert(samples);
+    }
+
+    fn has_left(&self) -> bool {
+        self.leaving == Some(0)
+    }
+
+    fn fall_silent(&mut self, left: &mut [f32], right: &mut [f32]) {
+        let Some(samples) = &mut self.leaving else { return };
+        for (left, right) in left.iter_mut().zip(right) {
+            *samples = samples.saturating_sub(1);
+            let gain = smooth_single(*samples as f32 / self.leave as f32);
+            (*left, *right) = (gain * *left, gain * *right);
+        }
     }
 
     fn fade(&mut self, left: &mut [f32], right: &mut [f32]) {
@@ -185,6 +210,10 @@ impl Playing {
             0x80 => parts.note_off(channel, first),
             0x90 => parts.note_on(channel, first, second),
             0xb0 => parts.controller(channel, first, second),
+            0xa0 => {
+                let breath = NoteExpression::Breath(f32::from(second.min(127)) / 127.0);
+                parts.express(NoteAddress::of_key(channel, first.min(127)), breath)
+            }
             0xd0 => parts.pressure(channel, first),
             0xe0 => {
                 let [low, high] = [first, second].map(|byte| u16::from(byte.min(127)));
@@ -344,6 +373,22 @@ impl Playing {
         self.takeover.begin(from.last);
     }
 
+    /// Falls silent within 5 ms, or is so already, for another instrument to [carry on](Self::carry_on).
+    pub fn leave(&mut self) {
+        // What sounds is never exactly 0.
+        self.takeover.leave(if self.last == [0.0; 2] { 0 } else { self.takeover.leave });
+    }
+
+    /// Whether it has fallen silent.
+    pub fn has_left(&self) -> bool {
+        self.takeover.has_left()
+    }
+
+    /// There is no other instrument: it sounds again.
+    pub fn stay(&mut self) {
+        self.takeover.begin(self.last);
+    }
+
     /// Makes the next samples, [`MOST_FRAMES`] at most; returns how many.
     pub fn process(&mut self, frames: usize) -> usize {
         let frames = frames.min(MOST_FRAMES);
@@ -384,6 +429,7 @@ impl Playing {
         }
         self.blower.advance(frames);
         self.takeover.fade(left, right);
+        self.takeover.fall_silent(left, right);
         if let (Some(&left), Some(&right)) = (left.last(), right.last()) {
             self.last = [left, right];
         }

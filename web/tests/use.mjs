@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { workshopOf } from './module.mjs';
-import { HEARD, KEY, LEVEL, PLAIN_HOST, SOUNDING, latest, launch, open, running, serve, silence, until } from './page.mjs';
+import { DYNAMIC, HEARD, KEY, LEVEL, PLAIN_HOST, SOUNDING, latest, launch, open, running, serve, silence, until } from './page.mjs';
 
 const [folder, own] = process.argv.slice(2);
 const server = await serve(folder);
@@ -256,6 +256,67 @@ const MIDI = {
     await end(opened);
   },
 
+  async 'MIDI that is asked for twice plays each note once, and is switched off whole'(browser) {
+    const before = () => {
+      // Each request has its own inputs, as the standard says, and takes its time.
+      const devices = [];
+      globalThis.devices = devices;
+      globalThis.wind = (...bytes) => devices.forEach((input) => input.onmidimessage?.({ data: new Uint8Array(bytes) }));
+      navigator.requestMIDIAccess = async () => {
+        await new Promise((later) => setTimeout(later, 200));
+        const input = { id: '1', name: 'Wind controller', state: 'connected', onmidimessage: null };
+        devices.push(input);
+        return { inputs: new Map([['1', input]]) };
+      };
+      globalThis.sent = [];
+    };
+    const opened = await open(browser, server.address, { before, ...PLAIN });
+    const { page } = opened;
+    await page.evaluate(() => {
+      const { hands } = globalThis.chalumeau;
+      const { send } = hands;
+      hands.send = (message) => {
+        globalThis.sent.push(message);
+        send(message);
+      };
+    });
+    await page.click('#midi');
+    await page.click('#midi');
+    await page.waitForFunction(() => document.getElementById('midi').getAttribute('aria-pressed') === 'true');
+    await page.waitForTimeout(400);
+    const strike = () => page.evaluate(() => {
+      globalThis.sent.length = 0;
+      globalThis.wind(0x90, 60, 100);
+      return globalThis.sent.map(({ midi }) => midi);
+    });
+    assert.deepEqual(await strike(), [[0x90, 60, 100]]);
+    await page.evaluate(() => globalThis.wind(0x80, 60, 0));
+    await page.click('#midi');
+    assert.deepEqual(await strike(), []);
+    // One that is closed before it is open stays closed.
+    await page.click('#midi');
+    await page.evaluate(() => document.getElementById('midi').setAttribute('aria-pressed', 'true'));
+    await page.click('#midi');
+    await page.waitForTimeout(400);
+    assert.deepEqual(await strike(), []);
+    await end(opened);
+  },
+
+  async 'a key that is pressed blows its note'(browser) {
+    const opened = await openWithDevice(browser);
+    const { page, wind } = opened;
+    await wind(0x90, 60, 100);
+    await until(page, LEVEL, HEARD);
+    await wind(0xa0, 60, 10);
+    await says(page, /^Breath: the note$/, 'breathing');
+    await until(page, DYNAMIC, 0, 0.2);
+    await wind(0xa0, 60, 127);
+    await until(page, DYNAMIC, 0.9);
+    await wind(0x80, 60, 0);
+    await silence(page);
+    await end(opened);
+  },
+
   async 'CC120 and CC123 let go of what is held'(browser) {
     const opened = await openWithDevice(browser);
     const { page, wind } = opened;
@@ -342,6 +403,49 @@ const HOLES = {
     await page.click('#hole-undo');
     assert.equal(await page.inputValue('#hole-place'), '468.0');
     assert.match(await page.textContent('#tags'), /^changed/);
+    await end(opened);
+  },
+
+  async 'the panel shows a hole of the instrument that is chosen, and moves it'(browser) {
+    const opened = await open(browser, server.address, PLAIN);
+    const { page } = opened;
+    await page.click('#holes');
+    const before = await page.inputValue('#hole-place');
+    await page.selectOption('#instrument', '4');
+    const place = await page.inputValue('#hole-place');
+    assert.notEqual(place, before);
+    const shown = await page.evaluate(() => {
+      const { holes } = globalThis.chalumeau;
+      return [holes.chosen, Number(document.getElementById('hole').value), (1e3 * holes.holes[holes.chosen].x).toFixed(1)];
+    });
+    assert.deepEqual(shown, [shown[1], shown[1], place]);
+    await enter(page, 'place', Number(place) + 1);
+    assert.equal(Object.keys(await moved(page)).length, 1);
+    await end(opened);
+  },
+
+  async 'what is back as the preset has it has not changed'(browser) {
+    const opened = await open(browser, server.address, PLAIN);
+    const { page } = opened;
+    const isChanged = async () => /^changed/.test(await page.textContent('#tags'));
+    await page.click('#holes');
+    await chooseHole(page, 'F_PAD');
+    await enter(page, 'place', 468);
+    assert.equal(await isChanged(), true);
+    await page.click('#hole-back');
+    assert.equal(await isChanged(), false);
+    await page.focus('#control-noise');
+    await page.keyboard.press('ArrowUp');
+    assert.equal(await isChanged(), true);
+    await page.keyboard.press('ArrowDown');
+    assert.equal(await isChanged(), false);
+    await page.selectOption('#instrument', '1');
+    assert.equal(await isChanged(), true);
+    await page.selectOption('#instrument', '0');
+    assert.equal(await isChanged(), false);
+    await page.reload();
+    await page.waitForFunction(() => globalThis.chalumeau?.engine.node);
+    assert.equal(await isChanged(), false);
     await end(opened);
   },
 
@@ -434,7 +538,8 @@ const HOLES = {
     await says(page, /^song.mid is not opened. A Chalumeau instrument file ends in .toml/, 'hole-state');
     assert.equal(await page.isVisible('#hole-panel'), true);
     await drop('other.toml', '[package]');
-    await says(page, /^other.toml is not opened. This is not a Chalumeau instrument file \(.toml\)/, 'hole-state');
+    await says(page, /^other.toml is not opened. This is not a Chalumeau instrument file \(.toml\). Line 1 is not understood.$/, 'hole-state');
+    assert.match(await page.getAttribute('#hole-state', 'title'), /unknown field/);
     await end(opened);
   },
 };
@@ -469,6 +574,51 @@ const HANDS = {
     await says(page, /^Choose a note/);
     await page.keyboard.press('a');
     await page.waitForFunction(() => !/^Choose a note/.test(document.getElementById('hint').textContent));
+    await end(opened);
+  },
+
+  async 'letters begin with the same written note on each instrument, and the arrows are said to blow'(browser) {
+    const opened = await open(browser, server.address, PLAIN);
+    const { page } = opened;
+    for (const at of ['0', '4', '2', '0']) {
+      await page.selectOption('#instrument', at);
+      await page.evaluate(() => document.activeElement.blur());
+      await page.keyboard.down('a');
+      // On the E flat and the C clarinet the same key is another written note.
+      await page.waitForFunction(() => /^(D4|A3)$/.test(document.getElementById('written').textContent));
+      await page.keyboard.press('ArrowUp');
+      await says(page, /^Breath: arrow keys$/, 'breathing');
+      await page.keyboard.up('a');
+      await says(page, /^Breath: keys$/, 'breathing');
+    }
+    await end(opened);
+  },
+
+  async 'the first preset that is found has the words in its name'(browser) {
+    const opened = await open(browser, server.address, PLAIN);
+    const { page } = opened;
+    for (const [words, name] of [['clarinet in c', 'Clarinet in C'], ['soft pad', 'Keys, soft pad'], ['bass', 'Bass in the section']]) {
+      await page.click('#browse');
+      await page.fill('#search', words);
+      await page.press('#search', 'Enter');
+      assert.equal(await page.textContent('#preset'), name, words);
+    }
+    await end(opened);
+  },
+
+  async 'help explains every control, and closes'(browser) {
+    const opened = await open(browser, server.address, PLAIN);
+    const { page } = opened;
+    await page.click('#about');
+    const [terms, meanings] = await Promise.all(['dt', 'dd'].map((kind) => page.locator(`#help ${kind}`).allTextContents()));
+    assert.deepEqual(terms, await page.locator('.knob b').allTextContents());
+    assert.ok(meanings.every((meaning) => meaning.length > 30));
+    assert.equal((await page.request.get(`${server.address}${await page.getAttribute('#help a[href$=txt]', 'href')}`)).status(), 200);
+    // No letter plays while it is read.
+    await page.keyboard.press('d');
+    assert.equal(await held(page), 0);
+    await page.keyboard.press('Escape');
+    assert.equal(await page.isVisible('#help'), false);
     await end(opened);
   },
 
@@ -642,6 +792,25 @@ const LOOKS = {
         all.filter((one) => one.offsetParent && Math.min(one.offsetWidth, one.offsetHeight) < 24).map((one) => one.id || one.textContent),
       );
       assert.deepEqual(small, [], `${size}: targets below 24 pixels`);
+      await end(opened);
+    }
+  },
+
+  async 'a pressed button is legible under the pointer and stays there'(browser) {
+    for (const [width, height] of [[1440, 900], [1024, 768], [768, 1024]]) {
+      const opened = await open(browser, server.address, { viewport: { width, height }, ...PLAIN });
+      const { page } = opened;
+      const before = await page.locator('#holes').boundingBox();
+      await page.click('#holes');
+      const look = await page.evaluate(() => {
+        const { color, backgroundColor } = getComputedStyle(document.getElementById('holes'));
+        return [color, backgroundColor];
+      });
+      assert.ok(contrast(...look) >= 4.5, `${width}: ${look}`);
+      assert.deepEqual(await page.locator('#holes').boundingBox(), before);
+      // One row of the header, or two.
+      const { height: header } = await page.locator('header').boundingBox();
+      assert.ok(header < 130, `${width}: ${header}`);
       await end(opened);
     }
   },

@@ -94,7 +94,7 @@ fn parameters_are_described_by_the_rules() {
         "Knob",
         "Feel",
         "Feel order",
-        "A/B",
+        "Study side",
         "H from",
         "k from",
         "Instrument",

@@ -15,8 +15,8 @@ pub enum ReedDescription {
     Dimensionless,
     /// Stiffness, area, width and opening.
     #[id = "phys"]
-    #[name = "Physical"]
-    Physical,
+    #[name = "Measured"]
+    Measured,
 }
 
 /// The reed in newtons and millimetres. Lip and strength act on top, as on the other description.
@@ -74,7 +74,7 @@ impl PhysicalReedParams {
 
     /// Whether it rules. Real-time safe.
     pub fn rules(&self) -> bool {
-        self.description.value() == ReedDescription::Physical
+        self.description.value() == ReedDescription::Measured
     }
 }
 
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn both_descriptions_of_the_reference_reed_are_one_reed() {
         let (seed, physical) =
-            (Settings::default(), description(ReedDescription::Physical, |_| {}).over(Settings::default()));
+            (Settings::default(), description(ReedDescription::Measured, |_| {}).over(Settings::default()));
         let near = |a: f32, b: f32| (a / b - 1.0).abs() < 1e-6;
         assert!(near(seed.reed_h, physical.reed_h) && near(seed.reed_k, physical.reed_k), "{physical:?}");
         assert!(near(seed.zeta, physical.zeta), "{physical:?}");
@@ -124,7 +124,7 @@ mod tests {
             |reed: &mut PhysicalReed| reed.tip_opening_m *= 0.7,
             |reed: &mut PhysicalReed| reed.width_m *= 0.6,
         ] {
-            let params = description(ReedDescription::Physical, change);
+            let params = description(ReedDescription::Measured, change);
             let (reed, settings) = (params.reed(), params.over(Settings::default()));
             assert!((settings.closing_pa() / reed.closing_pa() - 1.0).abs() < 1e-5, "{reed:?}");
             // Zeta is flow at rest over the root of the closing pressure: zeta_ref (H / H_ref) over the root of p_M / P.

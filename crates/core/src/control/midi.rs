@@ -252,6 +252,8 @@ impl MidiDecoder {
     pub fn silence(&mut self) -> &[Event] {
         self.begin();
         self.cut_all();
+        // A pedal whose end was lost would hold the next note, too. One that is down says so when it moves.
+        self.pedal = false;
         self.said.events()
     }
 

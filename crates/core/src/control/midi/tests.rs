@@ -508,6 +508,24 @@ fn a_key_two_channels_hold_comes_up_with_the_second() {
 }
 
 #[test]
+fn a_panic_lifts_the_pedal_and_the_controller_that_cuts_all_leaves_it() {
+    for is_panic in [true, false] {
+        let mut midi = MidiDecoder::new();
+        midi.controller(0, 64, 127);
+        midi.note_on(0, 60, 100);
+        assert!(midi.note_off(0, 60).is_empty(), "the pedal holds it");
+        if is_panic {
+            midi.silence()
+        } else {
+            midi.controller(0, 120, 0)
+        };
+        midi.note_on(0, 62, 100);
+        let ends = midi.note_off(0, 62).contains(&Event::NoteOff { note: SoundingNote(62) });
+        assert_eq!(ends, is_panic);
+    }
+}
+
+#[test]
 fn a_panic_leaves_the_wheels_where_they_are() {
     let mut midi = MidiDecoder::new();
     midi.note_on(0, 60, 90);
