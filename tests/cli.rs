@@ -335,6 +335,8 @@ fn numbers_out_of_range_say_what_would_be_right() {
     refused(&d, "impedance --written 60 --step 0.001 --from 1 --to 20000 --csv x.csv", &["points"]);
     refused(&d, "impedance", &["--peaks 8"]);
     refused(&d, "impedance --written 40 --peaks 8", &["written 40 (E2) has no fingering"]);
+    refused(&d, "impedance --written 60 --open-holes REG", &["cannot be used with"]);
+    refused(&d, "impedance --open-holes REK", &["no hole \"REK\"", "REG TRILL4_B"]);
     refused(&d, "impedance --written 60 --temperature 20", &["25 C", "--model tmm"]);
     refused(&d, "tune --dynamic mf --breath-response physical", &["has no dynamics"]);
     refused(&d, "tune --gamma 9", &["must lie in 0..3"]);

@@ -145,8 +145,9 @@ fn an_impedance_says_where_its_modes_and_its_cutoff_are() {
     let figure = fingering(&FingeringImpedance {
         instrument: &file.name,
         notes: vec!["a note".to_owned()],
-        written,
+        fingering: format!("written {written}"),
         sounding_hz,
+        pitch: "the note",
         curves: vec![Curve {
             name: "transfer matrices".to_owned(),
             z: (10..=250)

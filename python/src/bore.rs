@@ -18,7 +18,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 /// The range in which the models hold, Hz, as of `chalumeau impedance`.
 const FREQUENCIES_HZ: (f64, f64) = (1.0, 20_000.0);
 
-fn air(temperature_c: f64) -> PyResult<Air> {
+/// Air of a temperature, °C.
+pub fn air(temperature_c: f64) -> PyResult<Air> {
     if (10.0..=40.0).contains(&temperature_c) {
         return Ok(Air::at(temperature_c));
     }

@@ -7,6 +7,7 @@
 mod bore;
 mod features;
 mod instrument;
+mod making;
 mod mistakes;
 mod reed;
 mod render;
@@ -74,6 +75,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(bore::bifurcation, module)?)?;
     module.add_function(wrap_pyfunction!(bore::feel, module)?)?;
     module.add_function(wrap_pyfunction!(bore::torque, module)?)?;
+    module.add_function(wrap_pyfunction!(making::find_fingerings, module)?)?;
+    module.add_function(wrap_pyfunction!(making::check_instrument, module)?)?;
     module.add_function(wrap_pyfunction!(reed::reed_tables, module)?)?;
     module.add_function(wrap_pyfunction!(reed::reed_flow, module)?)?;
     module.add_function(wrap_pyfunction!(features::features, module)?)?;

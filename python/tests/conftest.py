@@ -42,12 +42,19 @@ def chalumeau_says(program):
 
 @pytest.fixture(scope="session")
 def table(chalumeau_says):
-    """Runs a command that prints a table; its columns by name, as floats, but for the names of the notes."""
+    """Runs a command that prints a table; its columns by name, as floats, or as texts where these are no numbers."""
     import csv
 
     def run(*words: str) -> dict[str, list[float]]:
         lines = [line for line in chalumeau_says(*words).splitlines() if not line.startswith("#")]
         rows = list(csv.DictReader(lines))
-        return {name: [float(row[name]) for row in rows] for name in rows[0] if name != "written"}
+
+        def column(name: str) -> list:
+            try:
+                return [float(row[name]) for row in rows]
+            except ValueError:
+                return [row[name] for row in rows]
+
+        return {name: column(name) for name in rows[0]}
 
     return run

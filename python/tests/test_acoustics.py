@@ -37,6 +37,43 @@ def test_peaks_are_those_of_the_command_line(table):
     np.testing.assert_allclose(peaks["q"], said["q"], atol=1e-4)
 
 
+def test_a_fingering_outside_the_chart_is_that_of_the_command_line(table):
+    open_holes = ["THUMB", "L1", "L2"]
+    said = table("impedance", "--open-holes", " ".join(open_holes), "--model", "tmm", "--peaks", "4")
+    peaks = chalumeau.impedance_peaks(open_holes, 4)
+    np.testing.assert_allclose(peaks["f_hz"], said["f_hz"], atol=1e-4)
+
+
+def test_found_fingerings_are_those_of_the_command_line(table):
+    said = table("fingerings", "--note", "B5", "--count", "8")
+    found = chalumeau.find_fingerings("B5", 8)
+    ours = len(found["open"])
+    assert 0 < ours <= 8 and found["unmoved"] == []
+    np.testing.assert_allclose(found["f_hz"], said["hz"][:ours], atol=0.05)
+    np.testing.assert_allclose(found["cost"], said["cost"][:ours], atol=0.005)
+    assert list(found["mode"]) == said["mode"][:ours] and found["fingers"] == said["fingers"][:ours]
+    assert [" ".join(holes) for holes in found["open"]] == said["open"][:ours]
+    chart = {one["written"]: one["open"] for one in chalumeau.fingerings()}
+    of_chart = [holes for holes, is_chart in zip(found["open"], found["of_chart"]) if is_chart]
+    assert of_chart in ([], [chart["B5"]])
+    with pytest.raises(ValueError, match="1..1000"):
+        chalumeau.find_fingerings("B5", 0)
+
+
+def test_a_hole_in_a_wrong_place_is_named():
+    assert chalumeau.check_instrument("bass")["concerns"] == []
+    text = chalumeau.instrument("b-flat").to_toml()
+    place = next(x for name, x, _ in chalumeau.instrument("b-flat").holes() if name == "R2")
+    shown = f"x_mm = {1e3 * place:.3f}".rstrip("0")
+    assert shown in text
+    moved = chalumeau.instrument(text.replace(shown, f"x_mm = {1e3 * place - 12:.3f}"))
+    found = chalumeau.check_instrument(moved)
+    assert found["is_usable"] and found["concerns"]
+    assert all(concern.endswith("the first hole that it opens is R2") for concern in found["concerns"])
+    with pytest.raises(ValueError, match="415..466"):
+        chalumeau.check_instrument("b-flat", a4=500)
+
+
 def test_thresholds_are_those_of_the_command_line(table):
     said = table("haptic", "--all", "--zeta", "0.25", "--contrast", "1")
     found = chalumeau.thresholds(zeta=0.25)

@@ -6,14 +6,11 @@ use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole};
 use chalumeau_core::bore::fingering_finder::mechanism::Mechanism;
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix};
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
-use chalumeau_core::units::{WrittenNote, cents};
+use chalumeau_core::units::WrittenNote;
 use clap::Args;
 use std::ops::ControlFlow;
-
-/// Peaks that an instrument file may name.
-const MODES_MOST: usize = 12;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -128,7 +125,7 @@ impl FingeringsCommand {
         };
         let model = TransferMatrix::new(&file, self.air.air());
         let one = |found: &Found| {
-            let mode = mode_of_file(found, &file, &model);
+            let mode = found.mode_of_file(&file, &model);
             format!(
                 "{},{:.1},{:+.1},{:.3},{},{},{:.2},{}",
                 quoted(&found.fingers),
@@ -170,15 +167,6 @@ impl FingeringsCommand {
         }
         table.finish()
     }
-}
-
-/// Which peak of the impedance a fingering plays, as instrument files count them: small ones, too, which the search leaves out.
-fn mode_of_file(found: &Found, file: &InstrumentFile, model: &TransferMatrix) -> Option<usize> {
-    let open: Vec<bool> = (0..file.holes.len()).map(|hole| found.grip.open >> hole & 1 == 1).collect();
-    let peaks = model.peaks(&open, file.reed_volume_m3, MODES_MOST);
-    let off = |peak: &Peak| cents(peak.f_hz, found.f_hz).abs();
-    let nearest = peaks.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
-    Some(nearest.0 + 1)
 }
 
 /// How far the resonance that plays stands above the next lower one, dB; the lowest one stands above none.

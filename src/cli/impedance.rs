@@ -3,9 +3,10 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, named};
 use crate::cli::plot_args::PlotArgs;
+use crate::cli::score_args::open_holes;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, QualityArg, counted, whole, within};
 use chalumeau_core::analysis::impedance::cutoff_hz;
-use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
+use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
 
 use chalumeau_core::instrument;
@@ -26,6 +27,7 @@ Examples:
   chalumeau impedance --all --peaks 8                    eight resonances of every fingering
   chalumeau impedance --written F4 --plot f4.svg         the curve as a figure, with modes and cut-off, beside the other model
   chalumeau impedance --all --peaks 6 --plot peaks.png   where the peaks of all notes are
+  chalumeau impedance --open-holes \"THUMB L1 L2\" --peaks 4   a fingering that is not in the chart
   chalumeau impedance --written 52 --from 100 --to 200 --step 0.1 --reed-volume";
 
 /// Which model calculates the impedance.
@@ -79,14 +81,19 @@ impl CurveRange {
 /// weakens the first one and shifts it, so the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
 /// peaks; it is left out unless --reed-volume is given.
 ///
-/// A curve is of one note: choose it with --written. All notes need --peaks.
+/// A curve is of one fingering: choose a note with --written, or name the open holes. All notes need --peaks.
 ///
-/// Columns: f_hz,re_z_over_zc,im_z_over_zc, or with --peaks written,written_midi,n,f_hz,mag_over_zc,q.
+/// Columns: f_hz,re_z_over_zc,im_z_over_zc, or with --peaks written,written_midi,n,f_hz,mag_over_zc,q: the note (empty with --open-holes), the number of the peak from 1, its
+/// frequency, height and quality factor.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ImpedanceCommand {
     #[command(flatten)]
     notes: NotesArg,
+    /// A fingering that is not in the chart, instead of a note: names of the open holes, as `fingerings` lists them, for example
+    /// "REG L3 R3 E_PAD"; all others are shut, and "" shuts all
+    #[arg(long, value_name = "HOLES", conflicts_with_all = ["all", "written"])]
+    open_holes: Option<String>,
     /// Table of the first N peaks instead of the curve, 1..30
     #[arg(long, value_name = "N", value_parser = |s: &str| whole::<u8>(s, 1, 30))]
     peaks: Option<u8>,
@@ -115,14 +122,21 @@ impl ImpedanceCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.table.check_files(&[self.instrument.file()], &[self.plot.path()])?;
         let file = self.instrument.load()?;
+        let given = self.open_holes.as_deref().map(|names| open_holes(names, &file)).transpose()?;
         let notes = self.notes.notes(&file)?;
+        let of_chart = || notes.iter().filter_map(|&written| file.fingering(written));
+        let fingerings: Vec<(Option<WrittenNote>, &[bool])> = match &given {
+            Some(open) => vec![(None, open)],
+            None => of_chart().map(|of| (Some(of.written), &of.open[..])).collect(),
+        };
+        let is_one = given.is_some() || self.notes.one().is_some();
         let (air, volume_m3) = (self.air.air(), if self.reed_volume { file.reed_volume_m3 } else { 0.0 });
         let steps = self.range.steps();
-        if self.peaks.is_none() && self.notes.one().is_none() {
-            let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
+        if self.peaks.is_none() && !is_one {
+            let right = "add --peaks 8 for the peaks of all notes, or choose one fingering with --written or --open-holes";
             return Err(Failure::Usage(format!("a table holds one curve only; {right}")));
         }
-        let curve = self.peaks.is_none() || (self.notes.one().is_some() && self.plot.wanted());
+        let curve = self.peaks.is_none() || (is_one && self.plot.wanted());
         if !curve && self.range.is_given() {
             return Err(Failure::Usage(
                 "--from, --to and --step are for a curve, and --peaks finds peaks wherever they are; leave them out, or draw the curve of one note with --written and --plot"
@@ -166,24 +180,25 @@ impl ImpedanceCommand {
         let bore = self.bore(&file)?;
         let mut table = self.table.open_beside(&plot, header)?;
         table.comment(format_args!("{about}"))?;
-        for fingering in notes.iter().filter_map(|&written| file.fingering(written)) {
+        for (note, open) in fingerings {
             if let Some(count) = self.peaks {
-                let peaks = bore.peaks(&fingering.open, volume_m3, usize::from(count));
-                for (n, peak) in (1..).zip(peaks) {
-                    let (note, f_hz, mag, q) = (fingering.written, peak.f_hz, peak.mag_over_zc, peak.q);
-                    let (name, written) = (named(note), note.0);
-                    table.line(format_args!("{name},{written},{n},{f_hz:.4},{mag:.6},{q:.4}"))?;
+                let peaks = bore.peaks(open, volume_m3, usize::from(count));
+                let note = note.map_or_else(|| ",".to_owned(), |note| format!("{},{}", named(note), note.0));
+                for (n, Peak { f_hz, mag_over_zc, q, .. }) in (1..).zip(peaks) {
+                    table.line(format_args!("{note},{n},{f_hz:.4},{mag_over_zc:.6},{q:.4}"))?;
                 }
             } else {
-                for (f_hz, z) in self.curve(&bore, &fingering.open, volume_m3) {
+                for (f_hz, z) in self.curve(&bore, open, volume_m3) {
                     table.line(format_args!("{f_hz},{:.8},{:.8}", z.re, z.im))?;
                 }
             }
         }
         table.finish()?;
-        plot.draw(|| match self.notes.one().and_then(|written| file.fingering(written)) {
-            Some(fingering) => self.fingering(&bore, &file, fingering, volume_m3),
-            None => self.chart(&bore, &file, &notes, volume_m3),
+        let one = || self.notes.one().and_then(|written| file.fingering(written));
+        plot.draw(|| match (&given, one()) {
+            (Some(open), _) => self.fingering(&bore, &file, (None, open), volume_m3),
+            (None, Some(of)) => self.fingering(&bore, &file, (Some(of.written), &of.open), volume_m3),
+            (None, None) => self.chart(&bore, &file, &notes, volume_m3),
         })
     }
 
@@ -206,12 +221,18 @@ impl ImpedanceCommand {
     }
 
     /// The figure of one fingering, with the other model beside the chosen one.
-    fn fingering(&self, bore: &Bore, file: &InstrumentFile, of: &Fingering, volume_m3: f64) -> Figure {
+    fn fingering(
+        &self,
+        bore: &Bore,
+        file: &InstrumentFile,
+        (written, open): (Option<WrittenNote>, &[bool]),
+        volume_m3: f64,
+    ) -> Figure {
         let air = self.air.air();
         let count = usize::from(self.peaks.unwrap_or(30));
-        let modes = bore.peaks(&of.open, volume_m3, count);
+        let modes = bore.peaks(open, volume_m3, count);
         let mut curves =
-            vec![Curve { name: bore.name().to_owned(), z: self.curve(bore, &of.open, volume_m3).collect() }];
+            vec![Curve { name: bore.name().to_owned(), z: self.curve(bore, open, volume_m3).collect() }];
         let mut notes = vec![format!(
             "{:.0} C, {}; Zc of a bore {:.1} mm wide",
             air.temperature_c,
@@ -219,14 +240,13 @@ impl ImpedanceCommand {
             2e3 * file.nominal_radius_m
         )];
         let exact = TransferMatrix::new(file, air);
-        let first = (of.open.iter().zip(&file.holes)).position(|(&open, hole)| open && !hole.register);
-        let cutoff_hz =
-            first.and_then(|hole| cutoff_hz(|f_hz| exact.reflectance_below(f_hz, &of.open, hole)));
+        let first = (open.iter().zip(&file.holes)).position(|(&open, hole)| open && !hole.register);
+        let cutoff_hz = first.and_then(|hole| cutoff_hz(|f_hz| exact.reflectance_below(f_hz, open, hole)));
         // The lattice is made for one air, and takes a fit for an instrument of one's own: beside the transfer matrices
         // it is drawn only where it was asked for.
         if matches!(bore, Bore::Lattice(_)) {
             let exact = Bore::Tmm(exact);
-            let theirs = exact.peaks(&of.open, volume_m3, count);
+            let theirs = exact.peaks(open, volume_m3, count);
             let range = self.range.first_hz()..=self.range.last_hz();
             let shown: Vec<&Peak> = modes.iter().filter(|mode| range.contains(&mode.f_hz)).collect();
             let apart: Vec<(f64, f64)> = shown
@@ -250,14 +270,24 @@ impl ImpedanceCommand {
                     mean(|&(_, db)| db)
                 ));
             }
-            let z = self.curve(&exact, &of.open, volume_m3).collect();
+            let z = self.curve(&exact, open, volume_m3).collect();
             curves.push(Curve { name: exact.name().to_owned(), z });
         }
         chalumeau_figure::impedance::fingering(&chalumeau_figure::impedance::FingeringImpedance {
             instrument: &file.name,
             notes,
-            written: of.written,
-            sounding_hz: sounding_hz(file, of.written),
+            fingering: match written {
+                Some(written) => format!("written {written}"),
+                None => match self.open_holes.as_deref().unwrap_or_default() {
+                    "" => "all holes shut".to_owned(),
+                    names => format!("{names} open"),
+                },
+            },
+            sounding_hz: written.map_or_else(
+                || modes.first().map_or(1.0, |mode| mode.f_hz),
+                |written| sounding_hz(file, written),
+            ),
+            pitch: if written.is_some() { "the note" } else { "the lowest peak" },
             curves,
             modes,
             cutoff_hz,

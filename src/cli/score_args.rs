@@ -144,7 +144,7 @@ fn trim(text: &str) -> Result<(u8, f64), String> {
 }
 
 /// Which holes are open, by their names.
-fn open_holes(names: &str, file: &InstrumentFile) -> Result<Vec<bool>, Failure> {
+pub fn open_holes(names: &str, file: &InstrumentFile) -> Result<Vec<bool>, Failure> {
     let mut open = vec![false; file.holes.len()];
     for name in names.split([' ', ',']).filter(|name| !name.is_empty()) {
         let hole = file.holes.iter().position(|hole| hole.name.eq_ignore_ascii_case(name));

@@ -22,10 +22,12 @@ pub struct FingeringImpedance<'a> {
     pub instrument: &'a str,
     /// Settings worth telling.
     pub notes: Vec<String>,
-    /// The note.
-    pub written: WrittenNote,
-    /// Its pitch, Hz.
+    /// Which fingering, as the title has it: `written F4`.
+    pub fingering: String,
+    /// Frequency whose multiples are marked, Hz, and what it is.
     pub sounding_hz: f64,
+    /// What that frequency is: `the note`.
+    pub pitch: &'a str,
     /// Models, the first one foremost.
     pub curves: Vec<Curve>,
     /// Modes of the first one.
@@ -46,8 +48,7 @@ fn db(z: Complex64) -> f64 {
 
 /// Magnitude with modes and cut-off, and phase, over frequency.
 pub fn fingering(about: &FingeringImpedance<'_>) -> Figure {
-    let written = about.written;
-    let mut figure = Figure::new(format!("Input impedance of written {written}")).note(about.instrument);
+    let mut figure = Figure::new(format!("Input impedance of {}", about.fingering)).note(about.instrument);
     for note in &about.notes {
         figure = figure.note(note);
     }
@@ -68,7 +69,7 @@ pub fn fingering(about: &FingeringImpedance<'_>) -> Figure {
     let every = 1 + harmonics.clone().count() / 30;
     let harmonics =
         harmonics.filter(|(_, text)| text.parse::<usize>().is_ok_and(|n| (n - 1).is_multiple_of(every)));
-    let label = format!("whole multiples of {:.1} Hz, the note", about.sounding_hz);
+    let label = format!("whole multiples of {:.1} Hz, {}", about.sounding_hz, about.pitch);
     // Room above for the words of the modes.
     let magnitude = Axis::linear("|Z| / Zc, dB").range(low_db - 3.0, high_db + 16.0);
     let mut upper = Panel::new("", axis(), magnitude).weight(2.0);

@@ -4,6 +4,7 @@ The same model that plays in the Chalumeau plugin, for research and teaching:
 
 - `render` and `Clarinet` make sound, as 32-bit float arrays, full scale 1.0;
 - `impedance`, `impedance_peaks`, `thresholds`, `bifurcation` show the physics;
+- `check_instrument` and `find_fingerings` help a maker;
 - `reed_tables`, `reed_flow` are the reed's law, `feel` and `torque` are what a knob makes of it;
 - `features` measures a note, `find_notes` those of a recording, `dataset` renders and measures thousands.
 
@@ -26,8 +27,10 @@ from typing import TYPE_CHECKING, Any
 from chalumeau._native import Instrument, __version__
 from chalumeau.acoustics import (
     bifurcation,
+    check_instrument,
     features,
     feel,
+    find_fingerings,
     find_notes,
     impedance,
     impedance_peaks,
@@ -61,9 +64,11 @@ __all__ = [
     "Note",
     "__version__",
     "bifurcation",
+    "check_instrument",
     "dataset",
     "features",
     "feel",
+    "find_fingerings",
     "find_notes",
     "fingerings",
     "impedance",

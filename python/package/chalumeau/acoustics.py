@@ -99,6 +99,58 @@ def impedance_peaks(
     )
 
 
+def find_fingerings(
+    written: NoteLike,
+    count: int = 10,
+    *,
+    instrument: InstrumentLike = "b-flat",
+    temperature: float = 25.0,
+    a4: float = 440.0,
+) -> dict[str, Any]:
+    """Fingerings for a written note, best first: every combination of holes that the fingers of a Boehm clarinet can make is looked through.
+
+    ``count`` is 1..1000. Returns lists and arrays of equal length, at most ``count``:
+
+    - ``fingers``: keys and holes that the hands press; ``open``: the names of the open holes, as `impedance` and `render` take them;
+    - ``f_hz`` and ``cents``: the resonance with the air that moves with the reed, and how far it is from the note. A played note lies
+      some 20 to 60 cents lower; the difference from the fingering of the chart is what one hears;
+    - ``gamma_on``: the mouth pressure at which it begins, over the closing pressure; ``mode``: which peak of the impedance it plays;
+    - ``evenness_db``: how far that resonance stands above the next lower one, 6 at most, nan for the lowest;
+    - ``cost``: what the ranking goes by, 0 the best; ``of_chart``: whether the chart has it for this note;
+
+    and ``unmoved``, the names of holes that neither finger nor key moves. Takes a few seconds. Source: by transfer matrices, after Botros,
+    Smith and Wolfe (2006). ``chalumeau fingerings`` gives the same.
+
+    >>> import chalumeau
+    >>> found = chalumeau.find_fingerings("B5", 5)
+    >>> len(found["open"]), bool((abs(found["cents"]) < 40).all()), bool((found["cost"][1:] >= found["cost"][:-1]).all())
+    (5, True, True)
+    """
+    return _native.find_fingerings(
+        instrument_of(instrument), note(written), whole("count", count), number("temperature", temperature), number("a4", a4)
+    )
+
+
+def check_instrument(
+    instrument: InstrumentLike, *, temperature: float = 25.0, a4: float = 440.0
+) -> dict[str, Any]:
+    """Whether the notes of an instrument are where its chart says, before it is played.
+
+    Returns arrays with one value for each fingering: ``written_midi``, ``mode`` (the peak of the impedance that is to sound), ``wanted_hz``
+    (equal temperament), ``f_hz`` (that peak, with the air that moves with the reed) and ``cents`` (how far the peak is above the note; nan
+    without a peak). Then ``concerns``, sentences about what a maker should look at; ``is_usable``, whether the instrument can be played; and
+    ``common_cents``, how far nearly all notes are off, where that is more than 20 cents, else None.
+
+    ``temperature`` is 10..40 °C, ``a4`` 415..466 Hz. ``chalumeau instrument check`` gives the same.
+
+    >>> import chalumeau
+    >>> found = chalumeau.check_instrument("b-flat")
+    >>> found["is_usable"], found["concerns"], bool(abs(found["cents"]).max() < 35)
+    (True, [], True)
+    """
+    return _native.check_instrument(instrument_of(instrument), number("temperature", temperature), number("a4", a4))
+
+
 def thresholds(*, instrument: InstrumentLike = "b-flat", **reed: Value) -> dict[str, Any]:
     """The mouth pressures between which each note of the chart sounds, over the closing pressure of the reed.
 

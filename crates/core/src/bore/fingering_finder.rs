@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 
 use crate::bore::ZETA;
 use crate::bore::instrument_file::{Fingering, HoleKind, InstrumentFile};
-use crate::bore::transfer_matrix::{Resonance, TransferMatrix, threshold_gamma};
+use crate::bore::transfer_matrix::{Peak, Resonance, TransferMatrix, threshold_gamma};
 use crate::maths;
 use crate::units::{Air, WrittenNote, cents};
 use mechanism::{Grip, MAX_FINGERS, Mechanism};
@@ -74,6 +74,20 @@ pub struct Found {
     pub evenness_db: f64,
     /// What the ranking goes by, from 0, the best.
     pub cost: f64,
+}
+
+/// Peaks of the impedance that an instrument file may name.
+const MODES_MOST: usize = 12;
+
+impl Found {
+    /// Which peak of the impedance it plays, as instrument files count them: small ones, too, which the search leaves out. `model` is of the same file.
+    pub fn mode_of_file(&self, file: &InstrumentFile, model: &TransferMatrix) -> Option<usize> {
+        let open: Vec<bool> = (0..file.holes.len()).map(|hole| self.grip.open >> hole & 1 == 1).collect();
+        let peaks = model.peaks(&open, file.reed_volume_m3, MODES_MOST);
+        let off = |peak: &Peak| cents(peak.f_hz, self.f_hz).abs();
+        let nearest = peaks.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
+        Some(nearest.0 + 1)
+    }
 }
 
 /// A fingering on which two notes may sound at once.
