@@ -63,13 +63,13 @@ def test_found_fingerings_are_those_of_the_command_line(table):
 def test_a_hole_in_a_wrong_place_is_named():
     assert chalumeau.check_instrument("bass")["concerns"] == []
     text = chalumeau.instrument("b-flat").to_toml()
-    place = next(x for name, x, _ in chalumeau.instrument("b-flat").holes() if name == "R2")
+    place = next(x for name, x, _ in chalumeau.instrument("b-flat").holes() if name == "L3")
     shown = f"x_mm = {1e3 * place:.3f}".rstrip("0")
     assert shown in text
-    moved = chalumeau.instrument(text.replace(shown, f"x_mm = {1e3 * place - 12:.3f}"))
+    moved = chalumeau.instrument(text.replace(shown, f"x_mm = {1e3 * place - 10:.3f}"))
     found = chalumeau.check_instrument(moved)
     assert found["is_usable"] and found["concerns"]
-    assert all(concern.endswith("the first hole that it opens is R2") for concern in found["concerns"])
+    assert all(concern.endswith("the first hole that it opens is L3") for concern in found["concerns"])
     with pytest.raises(ValueError, match="415..466"):
         chalumeau.check_instrument("b-flat", a4=500)
 
