@@ -139,7 +139,7 @@ impl ImpedanceCommand {
         let curve = self.peaks.is_none() || (is_one && self.plot.wanted());
         if !curve && self.range.is_given() {
             return Err(Failure::Usage(
-                "--from, --to and --step are for a curve, and --peaks finds peaks wherever they are; leave them out, or draw the curve of one note with --written and --plot"
+                "--from, --to and --step are for a curve, and --peaks finds peaks wherever they are; leave them out, or draw the curve of one fingering, too: --plot, with --written or --open-holes"
                     .to_owned(),
             ));
         }

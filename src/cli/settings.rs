@@ -536,6 +536,11 @@ mod tests {
         assert_ne!(by_flag, Settings::default());
         assert_eq!(read(&["--set", "rstiff=2000 N/m"]), Ok(by_flag));
         assert_eq!(read(&["--set", "rstiff=2000", "--set", "rface=measured"]), Ok(by_flag));
+        assert_eq!(
+            read(&["--set", "rstiff=2000", "--set", "rface=Physical"]),
+            Ok(by_flag),
+            "its former name"
+        );
         assert!(!read(&["--set", "rface=measured"]).unwrap().coupled);
         assert_eq!(read(&["--set", "rface=dimensionless"]), Ok(Settings::default()));
     }

@@ -6,6 +6,15 @@
 use crate::parameters::spelling::{bare_number, begins_with, canonical};
 use crate::parameters::{Choice, Kind, Number, Parameter, Switch, Value, Whole};
 
+/// Texts that choices had before, which presets of users still have: id, the text then, and now.
+const FORMER: [(&str, &str, &str); 1] = [("rface", "Physical", "Measured")];
+
+/// A text as the choice has it now.
+fn of_now<'a>(id: &str, text: &'a str) -> &'a str {
+    let is_former = |(of, then, _): &&(&str, &str, &str)| *of == id && text.trim().eq_ignore_ascii_case(then);
+    FORMER.iter().find(is_former).map_or(text, |(.., now)| now)
+}
+
 impl Number {
     /// A value as text, without its unit.
     pub fn text(&self, value: f32) -> String {
@@ -149,7 +158,7 @@ impl Parameter {
                 None => Err(format!("{id} ({name}) must be a number in {}, got {text:?}", number.range())),
             },
             Kind::Choice(choice) => choice
-                .parse(text)
+                .parse(of_now(id, text))
                 .map(Value::Choice)
                 .ok_or_else(|| format!("{id} ({name}) must be one of {}, got {text:?}", self.range())),
             Kind::Switch(switch) => switch

@@ -53,7 +53,7 @@ const TEXTS: &[(&str, &str)] = texts![
     "bass_pedal",
     "bass_with_teeth",
     "bass_close_up",
-    "full_of_air",
+    "mostly_air",
     "untamed_reed",
     "overblown",
     "glass_facing",

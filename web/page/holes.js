@@ -214,7 +214,11 @@ export class Holes {
     const moved = { name, x_m, radius_m: clamp(r, ...this.radii(x_m)) };
     // In their order along the bore, whichever was touched last.
     const place = (hole) => this.built.holes.findIndex((built) => built.name === hole.name);
-    this.put([...this.moved.filter((other) => other.name !== name), moved].sort((a, b) => place(a) - place(b)));
+    const others = this.moved.filter((other) => other.name !== name);
+    // One that is back where it was built has not moved.
+    const built = this.built.holes[this.chosen];
+    const isBack = Math.abs(moved.x_m - built.x) < 5e-5 && Math.abs(moved.radius_m - built.r) < 2.5e-5;
+    this.put((isBack ? others : [...others, moved]).sort((a, b) => place(a) - place(b)));
   }
 
   /** Puts all holes back where they were built, as a step that can be undone. */

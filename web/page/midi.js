@@ -39,11 +39,7 @@ export class Midi {
   }
 
   async openOnce() {
-    this.isWanted = true;
-    const access = await navigator.requestMIDIAccess();
-    // Meanwhile it was closed.
-    if (!this.isWanted || this.access) return;
-    this.access = access;
+    this.access ??= await navigator.requestMIDIAccess();
     this.access.onstatechange = () => this.listen();
     if (!document.hidden) this.claim();
     this.listen();
@@ -51,7 +47,6 @@ export class Midi {
 
   /** No device plays any more. */
   close() {
-    this.isWanted = false;
     [...this.inputs.keys()].forEach((input) => this.leave(input));
     this.inputs.clear();
     if (!this.access) return;
@@ -128,7 +123,10 @@ export class Midi {
       this.isTaken = false;
     }
     // A key's own breath ends with the key.
-    if (kind === KEY_PRESSURE) this.blown.set(ofKey(channel, first), { name: 'the note', message, value: second, input });
+    if (kind === KEY_PRESSURE) {
+      this.blown.set(ofKey(channel, first), { name: 'the note', message, value: second, input });
+      this.isTaken = false;
+    }
     if (kind === CONTROLLER && (first === SOUND_OFF || first === NOTES_OFF)) this.hands.forget();
     this.send({ midi: message });
   }

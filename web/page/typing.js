@@ -52,7 +52,7 @@ export class Typing {
   }
 
   down(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches?.('input[type=search], input[type=number], dialog *')) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches?.('input[type=search], input[type=number], dialog, dialog *')) return;
     if (event.code === 'Escape') return this.on({ silence: true });
     if (event.target.matches?.(OPEN_LIST)) return;
     const onControl = event.target.matches?.('[role=slider], input, select');

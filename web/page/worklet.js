@@ -52,6 +52,11 @@ class Chalumeau extends AudioWorkletProcessor {
 
   take(message) {
     const module = this.module;
+    // What is said after another instrument is for that one. A knob waits for nothing.
+    if (this.following && !message.knob && !message.knobBytes) {
+      this.waiting.push(message);
+      return;
+    }
     if (message.midi) module.chalumeau_midi(...message.midi);
     if ('breath' in message) module.chalumeau_breath(message.breath ?? -1);
     if (message.values) {
@@ -61,11 +66,6 @@ class Chalumeau extends AudioWorkletProcessor {
     if (message.set) {
       module.chalumeau_set(...message.set);
       module.chalumeau_settle();
-    }
-    // Notes that follow another instrument are for that one. A knob waits for nothing.
-    if (this.following && !message.knob && !message.knobBytes) {
-      this.waiting.push(message);
-      return;
     }
     if ('instrument' in message || message.prepared) {
       this.following = message;

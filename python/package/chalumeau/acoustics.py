@@ -114,12 +114,12 @@ def find_fingerings(
     - ``fingers``: keys and holes that the hands press; ``open``: the names of the open holes, as `impedance` and `render` take them;
     - ``f_hz`` and ``cents``: the resonance with the air that moves with the reed, and how far it is from the note. A played note lies
       some 20 to 60 cents lower; the difference from the fingering of the chart is what one hears;
-    - ``gamma_on``: the mouth pressure at which it begins, over the closing pressure; ``mode``: which peak of the impedance it plays;
+    - ``gamma_on``: the mouth pressure at which it begins, over the closing pressure; ``mode``: which peak of the impedance it plays, 0 if none is near;
     - ``evenness_db``: how far that resonance stands above the next lower one, 6 at most, nan for the lowest;
     - ``cost``: what the ranking goes by, 0 the best; ``of_chart``: whether the chart has it for this note;
 
     and ``unmoved``, the names of holes that neither finger nor key moves. Takes a few seconds. Source: by transfer matrices, after Botros,
-    Smith and Wolfe (2006). ``chalumeau fingerings`` gives the same.
+    Smith and Wolfe (2006). ``chalumeau fingerings`` does the same, and adds the fingering of the chart where it is not among the best.
 
     >>> import chalumeau
     >>> found = chalumeau.find_fingerings("B5", 5)
@@ -141,7 +141,7 @@ def check_instrument(
     without a peak). Then ``concerns``, sentences about what a maker should look at; ``is_usable``, whether the instrument can be played; and
     ``common_cents``, how far nearly all notes are off, where that is more than 20 cents, else None.
 
-    ``temperature`` is 10..40 °C, ``a4`` 415..466 Hz. ``chalumeau instrument check`` gives the same.
+    ``temperature`` is 10..40 °C, ``a4`` 415..466 Hz. ``chalumeau instrument check`` does the same.
 
     >>> import chalumeau
     >>> found = chalumeau.check_instrument("b-flat")

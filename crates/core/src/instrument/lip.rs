@@ -32,7 +32,7 @@ pub fn embouchure(note_hz: f64, lowest_hz: f64) -> Lip {
 const WHOLE_FACTOR: f64 = 6.35;
 /// Written E flat 6, 35 semitones: from here on it does not count.
 const NO_FACTOR: f64 = 7.55;
-/// Exponent of a reed's power with which the damping of the highest notes goes. Measured on written C6 to C7 of 18 presets and reeds, at five to eight
+/// Exponent of a reed's power with which the damping of the highest notes goes. Measured on written C6 to C7 of 17 presets, at five to eight
 /// velocities: without it the most powerful reeds (1.5 and more) jump from loud E6 and F6 to a mode at 1.25 of them, and the weakest (0.7 and less) stay on modes
 /// below, or are silent. With 0.5 some of both are left, and with 1 the most powerful are late or lost when soft.
 const WITH_POWER: f64 = 0.75;
