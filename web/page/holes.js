@@ -18,6 +18,8 @@ const NEAR = 26;
 const HINT = matchMedia('(hover: none)').matches
   ? 'Drag a hole along the bore. Its width is the second number.'
   : 'Drag a hole along the bore. With Shift, up makes it wider.';
+/** What has failed stays to be read for so long, unless the user acts, ms. */
+const TOLD_MS = 6000;
 const get = (id) => document.getElementById(id);
 /** What is wrong with a file, without the excerpt that a parser shows. */
 const inShort = (reason) => reason.replace(/TOML parse error at line (\d+)[^]*/, 'Line $1 is not understood.');
@@ -231,6 +233,7 @@ export class Holes {
     this.version += 1;
     // What can be saved is the answer to this question.
     this.file = null;
+    this.failedAt = -TOLD_MS;
     this.draw();
     clearTimeout(this.fitting);
     if (moved.length === 0) {
@@ -269,7 +272,7 @@ export class Holes {
 
   async hearFitted() {
     const { version, base } = this;
-    this.state('Computing the exact pitch …');
+    this.progress('Computing the exact pitch …');
     try {
       const told = await this.workshop.askLong({ do: 'move', fit: true, ...this.question() });
       if (version === this.version && base === this.base) this.take(told, true, true);
@@ -296,7 +299,7 @@ export class Holes {
       return { ...moved, x_m: x, radius_m: r };
     });
     this.draw();
-    this.state(isFitted ? 'Exact' : 'Pitch within about 10 cents; computing the exact pitch …');
+    this.progress(isFitted ? 'Exact' : 'Pitch within about 10 cents; computing the exact pitch …');
   }
 
   /** What a worker has prepared does not fit the sound. */
@@ -304,8 +307,16 @@ export class Holes {
     this.state('The moved holes are not heard. Reload the page to try again.', true);
   }
 
+  /** What a worker is at; it waits for a failure to be read. */
+  progress(text) {
+    clearTimeout(this.later);
+    this.later = setTimeout(() => this.state(text), Math.max(0, (this.failedAt ?? -TOLD_MS) + TOLD_MS - performance.now()));
+  }
+
   /** `details` are for who points at the text. */
   state(text, hasFailed = false, details = '') {
+    clearTimeout(this.later);
+    this.failedAt = hasFailed ? performance.now() : -TOLD_MS;
     Object.assign(get('hole-state'), { textContent: text, title: details });
     get('hole-state').classList.toggle('failed', hasFailed);
   }
