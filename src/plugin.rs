@@ -254,9 +254,9 @@ impl Chalumeau {
             window.forget_keys();
         }
         if let Some(instrument) = &mut self.instrument {
-            instrument.reset();
-            // What linked controllers have said to single players is forgotten, too.
+            // What linked controllers have said to single players is forgotten, too, and no player is on the way from it.
             instrument.set_settings(&self.settings);
+            instrument.reset();
         }
     }
 

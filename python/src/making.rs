@@ -5,7 +5,6 @@ use crate::instrument::Instrument;
 use crate::mistakes::{watched, wrong};
 use chalumeau_core::bore::check::Check;
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
-use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
 use chalumeau_core::units::WrittenNote;
@@ -20,12 +19,6 @@ fn a4(a4_hz: f64) -> PyResult<f64> {
         return Ok(a4_hz);
     }
     Err(wrong(format_args!("a4 must lie in {low}..{high} Hz, got {a4_hz}")))
-}
-
-/// Names of the open holes.
-fn open(file: &InstrumentFile, bits: u64) -> Vec<&str> {
-    let open = file.holes.iter().enumerate().filter(|(hole, _)| bits >> hole & 1 == 1);
-    open.map(|(_, hole)| hole.name.as_str()).collect()
 }
 
 /// Fingerings for a written note, best first.
@@ -56,7 +49,10 @@ pub fn find_fingerings<'py>(
     let numbers = |of: fn(&Found) -> f64| PyArray1::from_iter(py, found.iter().map(of));
     let columns = PyDict::new(py);
     columns.set_item("fingers", found.iter().map(|found| found.fingers.as_str()).collect::<Vec<_>>())?;
-    columns.set_item("open", found.iter().map(|found| open(file, found.grip.open)).collect::<Vec<_>>())?;
+    columns.set_item(
+        "open",
+        found.iter().map(|found| found.grip.open_names(file).collect::<Vec<_>>()).collect::<Vec<_>>(),
+    )?;
     columns.set_item("f_hz", numbers(|found| found.f_hz))?;
     columns.set_item("cents", numbers(|found| found.cents))?;
     columns.set_item("gamma_on", numbers(|found| found.gamma_on))?;

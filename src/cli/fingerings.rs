@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
 use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole};
-use chalumeau_core::bore::fingering_finder::mechanism::Mechanism;
+use chalumeau_core::bore::fingering_finder::mechanism::{Grip, Mechanism};
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
@@ -118,7 +118,7 @@ impl FingeringsCommand {
                     one.uneven_db,
                     one.gamma_on,
                     one.cost,
-                    quoted(&open(&file, one.grip.open))
+                    quoted(&open(&one.grip, &file))
                 ))?;
             }
             return table.finish();
@@ -135,7 +135,7 @@ impl FingeringsCommand {
                 mode.map_or_else(String::new, |mode| mode.to_string()),
                 evenness(found),
                 found.cost,
-                quoted(&open(&file, found.grip.open))
+                quoted(&open(&found.grip, &file))
             )
         };
         if let Some(to) = self.trill_to.map(WrittenNote) {
@@ -175,7 +175,6 @@ fn evenness(found: &Found) -> String {
 }
 
 /// Names of the open holes.
-fn open(file: &InstrumentFile, bits: u64) -> String {
-    let open = file.holes.iter().enumerate().filter(|(hole, _)| bits >> hole & 1 == 1);
-    open.map(|(_, hole)| hole.name.as_str()).collect::<Vec<_>>().join(" ")
+fn open(grip: &Grip, file: &InstrumentFile) -> String {
+    grip.open_names(file).collect::<Vec<_>>().join(" ")
 }

@@ -20,6 +20,8 @@ const HINT = matchMedia('(hover: none)').matches
   : 'Drag a hole along the bore. With Shift, up makes it wider.';
 /** What has failed stays to be read for so long, unless the user acts, ms. */
 const TOLD_MS = 6000;
+/** Half of the last digit of place and width in the panel, m. */
+const SAME = 5e-5;
 const get = (id) => document.getElementById(id);
 /** What is wrong with a file, without the excerpt that a parser shows. */
 const inShort = (reason) => reason.replace(/TOML parse error at line (\d+)[^]*/, 'Line $1 is not understood.');
@@ -219,7 +221,7 @@ export class Holes {
     const others = this.moved.filter((other) => other.name !== name);
     // One that is back where it was built has not moved.
     const built = this.built.holes[this.chosen];
-    const isBack = Math.abs(moved.x_m - built.x) < 5e-5 && Math.abs(moved.radius_m - built.r) < 2.5e-5;
+    const isBack = Math.abs(moved.x_m - built.x) < SAME && Math.abs(2 * (moved.radius_m - built.r)) < SAME;
     this.put((isBack ? others : [...others, moved]).sort((a, b) => place(a) - place(b)));
   }
 
@@ -233,7 +235,7 @@ export class Holes {
     this.version += 1;
     // What can be saved is the answer to this question.
     this.file = null;
-    this.failedAt = -TOLD_MS;
+    this.failedAt = -Infinity;
     this.draw();
     clearTimeout(this.fitting);
     if (moved.length === 0) {
@@ -310,13 +312,13 @@ export class Holes {
   /** What a worker is at; it waits for a failure to be read. */
   progress(text) {
     clearTimeout(this.later);
-    this.later = setTimeout(() => this.state(text), Math.max(0, (this.failedAt ?? -TOLD_MS) + TOLD_MS - performance.now()));
+    this.later = setTimeout(() => this.state(text), Math.max(0, this.failedAt + TOLD_MS - performance.now()));
   }
 
   /** `details` are for who points at the text. */
   state(text, hasFailed = false, details = '') {
     clearTimeout(this.later);
-    this.failedAt = hasFailed ? performance.now() : -TOLD_MS;
+    this.failedAt = hasFailed ? performance.now() : -Infinity;
     Object.assign(get('hole-state'), { textContent: text, title: details });
     get('hole-state').classList.toggle('failed', hasFailed);
   }

@@ -15,9 +15,9 @@ const TOUCH = 0.62;
 const who = (pointerId) => `pointer ${pointerId} on the piano`;
 
 export class Keyboard {
-  /** `hands` plays; `breathe` gets the breath of a touch, or null when the last touch ends; `moved` whether there is more below and above. */
-  constructor(element, hands, breathe, moved) {
-    Object.assign(this, { element, hands, breathe, moved, keys: new Map(), touches: new Map(), letters: new Map() });
+  /** `hands` plays; `breathe` gets the breath of a touch, or null when the last touch ends; `see` whether there is more below and above. */
+  constructor(element, hands, breathe, see) {
+    Object.assign(this, { element, hands, breathe, see, keys: new Map(), touches: new Map(), letters: new Map() });
     this.from = null;
     new ResizeObserver(() => this.build()).observe(element);
     element.addEventListener('pointerdown', (event) => this.down(event));
@@ -47,12 +47,6 @@ export class Keyboard {
     this.build();
   }
 
-  /** Whether there are keys below what is seen, and above. */
-  get more() {
-    const [first, last] = [this.first - Number(isBlack(this.first)), this.last + Number(isBlack(this.last))];
-    return [this.shown?.[0] > first, this.shown?.[1] < last];
-  }
-
   build() {
     if (this.first === undefined || this.element.clientWidth < 10) return;
     const whites = (from, to) => Array.from({ length: to - from + 1 }, (_, n) => from + n).filter((note) => !isBlack(note));
@@ -65,13 +59,14 @@ export class Keyboard {
     this.element.parentElement.classList.toggle('part', isPart);
     let seen = all;
     if (isPart) {
+      // At first from the lowest C but for the last notes below it.
       const start = all.findIndex((note) => note >= (this.from ?? 12 * Math.ceil((first + 4) / 12)));
       const at = clamp(start < 0 ? all.length : start, 0, Math.max(0, all.length - room));
       seen = all.slice(at, at + room);
       this.from = seen[0];
     }
     this.shown = [seen[0], seen.at(-1)];
-    this.moved(this.more);
+    this.see([seen[0] > first, seen.at(-1) < last]);
     const width = 100 / seen.length;
     this.keys.clear();
     const place = (note) => {

@@ -111,8 +111,8 @@ impl<'a> BreathAndHaptics<'a> {
         let mut words = vec![format!(
             "A note speaks from a mouth pressure on, beats from where the reed touches the facing in each cycle, and chokes \
              where the reed stays shut; these are worked out from the bore and from the reed as it moves under the lip. It \
-             closes, at {closing_kpa:.2} kPa for every note, where the resting reed would be shut. On a curved lay the \
-             reed rolls up from where it beats and is shut only at more."
+             closes, at {closing_kpa:.2} kPa for every note, where the resting reed would be shut. On a curved facing \
+             the reed rolls up from where it beats and is shut only at more."
         )];
         let mut plates = vec![Plate {
             figure: pressures(instrument, &self.reed(), closing_kpa, &changes),

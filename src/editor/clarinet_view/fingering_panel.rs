@@ -15,7 +15,7 @@ use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::editor::widgets::segments;
-use chalumeau_core::bore::fingering_finder::{FARTHEST_CENTS, Found};
+use chalumeau_core::bore::fingering_finder::FARTHEST_CENTS;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
@@ -184,7 +184,7 @@ fn answer_list(
         ui.spacing_mut().item_spacing.y = 1.0;
         for (nth, row) in answer.rows.iter().enumerate() {
             if let Some(found) = draw_row(ui, nth + 1, row, file, tried) {
-                chosen = Some(holes(found, file));
+                chosen = Some(found.grip.holes(file));
             }
         }
     });
@@ -210,9 +210,4 @@ fn none_found(names: NoteNames, answer: &FingeringAnswer, file: &InstrumentFile)
         title(file.lowest()),
         title(file.highest())
     )
-}
-
-/// Whether each hole is open.
-fn holes(found: &Found, file: &InstrumentFile) -> Vec<bool> {
-    (0..file.holes.len()).map(|hole| found.grip.open >> hole & 1 == 1).collect()
 }

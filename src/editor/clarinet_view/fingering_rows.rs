@@ -175,8 +175,7 @@ fn cell(
     response.on_hover_ui(|ui| {
         ui.set_max_width(300.0);
         ui.strong(fingers_title(&found.fingers));
-        let open = file.holes.iter().enumerate().filter(|(hole, _)| found.grip.open >> hole & 1 == 1);
-        let open: Vec<String> = open.map(|(_, hole)| hole_title(&hole.name)).collect();
+        let open: Vec<String> = found.grip.open_names(file).map(hole_title).collect();
         ui.label(format!("Open: {}", if open.is_empty() { "none".to_owned() } else { open.join(", ") }));
         let over = match (found.mode, found.evenness_db) {
             (1, _) => "the lowest".to_owned(),

@@ -147,7 +147,7 @@ mod tests {
         // G4 of the chart, on the key of E4.
         let (g4, _) = wait(&mut searcher, question(67), &file);
         let chosen = &g4.rows[0].note;
-        let open: Vec<bool> = (0..file.holes.len()).map(|hole| chosen.grip.open >> hole & 1 == 1).collect();
+        let open = chosen.grip.holes(&file);
         let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
         let mut heard_hz = |event| {
             clarinet.apply(event);

@@ -37,6 +37,9 @@ const MOST_UNEVEN_DB: f64 = 6.0;
 /// Multiphonics whose notes are nearer than this, cents, are taken as one.
 const ALIKE_CENTS: f64 = 35.0;
 
+/// Peaks of the impedance that an instrument file may name.
+const MODES_MOST: usize = 12;
+
 /// All fingerings of an instrument with their resonances.
 #[derive(Debug)]
 pub struct FingeringFinder {
@@ -76,14 +79,10 @@ pub struct Found {
     pub cost: f64,
 }
 
-/// Peaks of the impedance that an instrument file may name.
-const MODES_MOST: usize = 12;
-
 impl Found {
     /// Which peak of the impedance it plays, as instrument files count them: small ones, too, which the search leaves out. `model` is of the same file.
     pub fn mode_of_file(&self, file: &InstrumentFile, model: &TransferMatrix) -> Option<usize> {
-        let open: Vec<bool> = (0..file.holes.len()).map(|hole| self.grip.open >> hole & 1 == 1).collect();
-        let peaks = model.peaks(&open, file.reed_volume_m3, MODES_MOST);
+        let peaks = model.peaks(&self.grip.holes(file), file.reed_volume_m3, MODES_MOST);
         let off = |peak: &Peak| cents(peak.f_hz, self.f_hz).abs();
         let nearest = peaks.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
         Some(nearest.0 + 1)

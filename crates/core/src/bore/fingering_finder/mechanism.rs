@@ -237,4 +237,15 @@ impl Grip {
     pub fn moves(&self, to: &Self) -> usize {
         self.positions.iter().zip(&to.positions).filter(|(a, b)| a != b).count()
     }
+
+    /// Whether each hole of the file is open.
+    pub fn holes(&self, file: &InstrumentFile) -> Vec<bool> {
+        (0..file.holes.len()).map(|hole| self.open >> hole & 1 == 1).collect()
+    }
+
+    /// Names of the open holes.
+    pub fn open_names<'a>(&self, file: &'a InstrumentFile) -> impl Iterator<Item = &'a str> {
+        let named = self.holes(file).into_iter().zip(&file.holes);
+        named.filter_map(|(is_open, hole)| is_open.then_some(hole.name.as_str()))
+    }
 }
