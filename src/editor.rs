@@ -255,9 +255,13 @@ impl EditorState {
         self.entry.is_some() || ctx.text_edit_focused()
     }
 
-    /// Forgets what can be undone and what A and B are: all of it was of a setting that another project has replaced.
-    pub fn forget_settings(&mut self) {
+    /// Another project has been loaded: forgets what can be undone and what A and B are, and ends a feel test, all of which were of
+    /// the settings before.
+    pub fn forget_settings(&mut self) -> Vec<Action> {
+        let mut actions = Vec::new();
         (self.history, self.compare) = Default::default();
+        self.knob.end_test(&mut actions);
+        actions
     }
 
     /// Lets go of everything that is held: before the window closes.
@@ -378,6 +382,10 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, kept.names, snapshot, is_text, &mut actions));
     // A pressure would tell one setting from another.
     let has_meter = tab != Tab::Play && !is_blind;
+    if tab != Tab::Knob || is_blind || presets.is_open || files.is_open() {
+        // The hand would go on feeling a test that no view shows.
+        knob.end_test(&mut actions);
+    }
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
     if has_meter {

@@ -5,11 +5,11 @@
 
 use std::fs;
 use std::io;
-use std::io::BufWriter;
+use std::io::{BufWriter, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, PersistError};
 
 /// Temporary files of this process.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -176,6 +176,71 @@ impl NewFile {
             Err(source) => Err(OutputError::Write { path, source: plain(source) }),
         }
     }
+
+    /// Gives a file of lines its name, even if not all of it could be written: then it ends with its last whole line. If another
+    /// file has the name by now, its name gets a number.
+    pub fn keep_lines(self) -> Result<KeptLines, OutputError> {
+        let Self { path, mut temp, _listed, .. } = self;
+        let cut = io::Write::flush(&mut temp).err().map(plain);
+        // What is still in the buffer finds no room.
+        let (mut temp, _) = temp.into_parts();
+        let refused = |source| OutputError::Write { path: path.clone(), source: plain(source) };
+        if cut.is_some() {
+            end_with_a_line(temp.as_file_mut()).map_err(refused)?;
+        }
+        loop {
+            let path = free_path(&path);
+            match temp.persist_noclobber(&path) {
+                Ok(_) => return Ok(KeptLines { path, cut }),
+                Err(PersistError { error, file }) if error.kind() == io::ErrorKind::AlreadyExists => {
+                    temp = file
+                }
+                Err(PersistError { error, .. }) => return Err(refused(error)),
+            }
+        }
+    }
+}
+
+/// A file of lines that has its name.
+#[derive(Debug)]
+pub struct KeptLines {
+    /// The name.
+    pub path: PathBuf,
+    /// Why the last lines are missing, if they are.
+    pub cut: Option<io::Error>,
+}
+
+/// A path that no file has: this one or, if it is taken, the same with a number before its extension.
+pub fn free_path(path: &Path) -> PathBuf {
+    let (mut free, mut number) = (path.to_owned(), 0);
+    while free.exists() {
+        number += 1;
+        let mut name = path.file_stem().unwrap_or_default().to_owned();
+        name.push(format!("-{number}"));
+        if let Some(extension) = path.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        free.set_file_name(name);
+    }
+    free
+}
+
+/// Removes what follows the last line's end.
+fn end_with_a_line(file: &mut fs::File) -> io::Result<()> {
+    const STEP: u64 = 4_096;
+    let mut end = file.seek(SeekFrom::End(0))?;
+    while end > 0 {
+        let begin = end.saturating_sub(STEP);
+        let mut bytes = Vec::new();
+        file.seek(SeekFrom::Start(begin))?;
+        Read::take(&mut *file, end - begin).read_to_end(&mut bytes)?;
+        if let Some(last) = bytes.iter().rposition(|&byte| byte == b'\n') {
+            return file.set_len(begin + last as u64 + 1);
+        }
+        end = begin;
+    }
+    file.set_len(0)
 }
 
 /// Writes a small file of the program's own, in place of what was there. Its folder is made.
@@ -247,6 +312,50 @@ mod tests {
         file.keep().unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(names(directory.path()), ["x"]);
+    }
+
+    #[test]
+    fn lines_are_kept_as_far_as_they_go_beside_other_files() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x.csv");
+        // All of them begin before the first one is kept.
+        let files = [(); 3].map(|()| NewFile::create(&free_path(&path), false).unwrap());
+        for (mut file, name) in files.into_iter().zip(["x.csv", "x-1.csv", "x-2.csv"]) {
+            writeln!(file, "one line").unwrap();
+            let kept = file.keep_lines().unwrap();
+            assert!(kept.cut.is_none());
+            assert_eq!(kept.path.file_name().unwrap(), name);
+            assert_eq!(fs::read(&kept.path).unwrap(), b"one line\n");
+        }
+        for (written, kept) in [("a\nbc", "a\n"), ("a\n", "a\n"), ("abc", ""), ("", "")] {
+            fs::write(&path, written).unwrap();
+            let mut file = fs::File::options().read(true).write(true).open(&path).unwrap();
+            end_with_a_line(&mut file).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), kept);
+        }
+        let long = "x".repeat(9_000);
+        fs::write(&path, format!("a\n{long}")).unwrap();
+        end_with_a_line(&mut fs::File::options().read(true).write(true).open(&path).unwrap()).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "a\n");
+    }
+
+    /// A disk without room, as the system has it.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_a_full_disk_has_taken_stays() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut file = NewFile::create(&directory.path().join("x.csv"), false).unwrap();
+        writeln!(file, "written").unwrap();
+        file.flush().unwrap();
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let temp = file.temp.get_mut();
+        let written = std::mem::replace(temp.as_file_mut(), full);
+        writeln!(file, "lost").unwrap();
+        assert!(file.flush().is_err());
+        *file.temp.get_mut().as_file_mut() = written;
+        let KeptLines { path, cut } = file.keep_lines().unwrap();
+        assert!(cut.is_none(), "there is room again");
+        assert_eq!(fs::read_to_string(path).unwrap(), "written\nlost\n");
     }
 
     #[test]

@@ -11,6 +11,7 @@
 
 mod arguments;
 mod devices;
+mod held_keys;
 mod jack;
 mod keyboards;
 mod log;

@@ -1,4 +1,4 @@
-//! Writes takes as files. A take appears in its folder complete or not at all.
+//! Writes takes as files, which appear in their folder when they end.
 
 use std::io;
 use std::path::Path;
@@ -11,7 +11,7 @@ use chalumeau_knob::wire::Info;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::output::{NewFile, OutputError};
+use crate::output::{KeptLines, NewFile, OutputError};
 
 /// A take that is being written. [`keep`](Self::keep) makes the complete file appear.
 pub struct TakeFile {
@@ -42,6 +42,11 @@ impl TakeFile {
     /// Gives the file its name.
     pub fn keep(self) -> Result<(), OutputError> {
         self.writer.into_inner().keep()
+    }
+
+    /// Gives the file a name, even if not all rows could be written.
+    pub fn keep_lines(self) -> Result<KeptLines, OutputError> {
+        self.writer.into_inner().keep_lines()
     }
 }
 

@@ -138,6 +138,11 @@ impl ControllerLinks {
         has_changed
     }
 
+    /// Whether a parameter can get a link: it has one, or there is room for another.
+    pub fn can_learn(&self, parameter: &Parameter) -> bool {
+        self.places.iter().any(|place| place.get().is_none_or(|link| link.parameter == parameter))
+    }
+
     /// Waits for a controller that a hand moves, to link it to this parameter; `None` waits no more.
     pub fn learn(&self, parameter: Option<&Parameter>) {
         self.heard.store(0, Ordering::Relaxed);

@@ -1,6 +1,6 @@
 //! Controllers that the user links to parameters: learnt from a control's menu, named beside it.
 
-use egui::{Align2, Pos2, Response, Ui, vec2};
+use egui::{Align2, Button, Pos2, Response, Ui, vec2};
 
 use crate::controllers::{ControllerLinks, ParameterLink, linkable, source_name};
 use crate::editor::controls::Hands;
@@ -8,6 +8,7 @@ use crate::editor::host_marks;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::parameters::{self, Kind};
+use chalumeau_core::control::midi::links::MOST as MOST_LINKS;
 
 /// Where a control is clicked with the right button: the menu of its controllers, or the host's where none can be linked.
 pub fn offer_menu(ui: &Ui, hands: &Hands, id: &'static str, response: &Response) {
@@ -36,8 +37,12 @@ fn offer(ui: &Ui, hands: &Hands, id: &'static str, response: &Response, clicked:
             if ui.button("Stop waiting for a controller").clicked() {
                 links.learn(None);
             }
-        } else if ui.button("Learn a controller").clicked() {
-            links.learn(parameters::find(id));
+        } else if let Some(parameter) = parameters::find(id) {
+            let learn = ui.add_enabled(links.can_learn(parameter), Button::new("Learn a controller"));
+            let full = format!("There are {MOST_LINKS} links already. Forget one of them first.");
+            if learn.on_disabled_hover_text(full).clicked() {
+                links.learn(Some(parameter));
+            }
         }
         let all = links.all();
         for (link, _) in all.iter().filter(|(link, _)| link.parameter.id == id) {

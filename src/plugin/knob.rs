@@ -111,6 +111,11 @@ impl SharedKnob {
         }
     }
 
+    /// The feel of a test, if one is on.
+    fn tested(&self) -> Option<message::Feel> {
+        self.test.lock().ok().and_then(|test| *test)
+    }
+
     /// Torque off, now. Real-time safe.
     pub fn let_go(&self, reason: Release) {
         if let Some(heart) = self.audio_heart.get() {

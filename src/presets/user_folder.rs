@@ -51,6 +51,9 @@ impl UserPresets {
     }
 }
 
+/// A file that should be a preset, and what is in it or why it is none.
+type ReadFile = (PathBuf, Result<Preset, String>);
+
 impl UserFolder {
     /// The folder `presets` in the [user's data](data_folder::folder); `None` if there is none.
     pub fn system() -> Option<Self> {
@@ -70,7 +73,11 @@ impl UserFolder {
     /// Reads everything. A folder that does not exist is empty.
     pub fn read(&self) -> UserPresets {
         let mut found = UserPresets::default();
-        for (path, read) in self.files() {
+        let files = self.files().unwrap_or_else(|reason| {
+            found.broken.push(reason);
+            Vec::new()
+        });
+        for (path, read) in files {
             match read {
                 Ok(preset) if found.presets.iter().any(|other| other.name == preset.name) => {
                     let shown = path.display();
@@ -108,20 +115,24 @@ impl UserFolder {
         Ok(text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned).collect())
     }
 
-    /// Each file that should be a preset, in the order of their names.
-    fn files(&self) -> Vec<(PathBuf, Result<Preset, String>)> {
-        let Ok(entries) = fs::read_dir(&self.folder) else { return Vec::new() };
+    /// Each file that should be a preset, in the order of their names; none where there is no folder.
+    fn files(&self) -> Result<Vec<ReadFile>, String> {
+        let entries = match fs::read_dir(&self.folder) {
+            Err(reason) if reason.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+            read => read.map_err(|reason| format!("{}: cannot be read: {reason}", self.folder.display()))?,
+        };
         let paths = entries.filter_map(Result::ok).map(|entry| entry.path());
         let mut paths: Vec<_> =
             paths.filter(|path| path.extension().is_some_and(|is| is == SUFFIX)).take(FILES_MOST).collect();
         paths.sort();
-        paths.into_iter().map(|path| (path.clone(), read_file(&path))).collect()
+        Ok(paths.into_iter().map(|path| (path.clone(), read_file(&path))).collect())
     }
 
     /// The file of a preset.
-    fn find(&self, name: &str) -> Option<PathBuf> {
-        let mut files = self.files().into_iter();
-        files.find(|(_, read)| read.as_ref().is_ok_and(|preset| preset.name == name)).map(|(path, _)| path)
+    fn find(&self, name: &str) -> Result<Option<PathBuf>, String> {
+        let mut files = self.files()?.into_iter();
+        let found = files.find(|(_, read)| read.as_ref().is_ok_and(|preset| preset.name == name));
+        Ok(found.map(|(path, _)| path))
     }
 
     /// Saves a preset. One of the same name is replaced if it is `shown`, as the user saw it who wants to replace it; any other one
@@ -134,7 +145,7 @@ impl UserFolder {
         if factory::find(&name).is_some() {
             return Err(format!("{name:?} is a factory preset; choose another name"));
         }
-        let path = match self.find(&name) {
+        let path = match self.find(&name)? {
             Some(path) if read_file(&path).ok().as_ref() != shown => {
                 return Err(format!(
                     "there is a preset {name:?} already, saved since this list was read; save again to replace it, or choose \
@@ -156,8 +167,8 @@ impl UserFolder {
         if new == old {
             return Ok(());
         }
-        let path = self.find(old).ok_or_else(|| self.is_missing(old))?;
-        if factory::find(&new).is_some() || self.find(&new).is_some() {
+        let path = self.find(old)?.ok_or_else(|| self.is_missing(old))?;
+        if factory::find(&new).is_some() || self.find(&new)?.is_some() {
             return Err(format!("there is a preset {new:?} already; choose another name"));
         }
         let preset = Preset { name: new.clone(), ..read_file(&path)? };
@@ -173,7 +184,7 @@ impl UserFolder {
 
     /// Deletes a preset.
     pub fn delete(&self, name: &str) -> Result<(), String> {
-        let path = self.find(name).ok_or_else(|| self.is_missing(name))?;
+        let path = self.find(name)?.ok_or_else(|| self.is_missing(name))?;
         fs::remove_file(&path).map_err(|reason| format!("cannot remove {}: {reason}", path.display()))?;
         // Another preset of this name is not liked from the start.
         self.set_favourite(name, false)
@@ -392,6 +403,8 @@ mod tests {
         let file = root.path().join("file");
         fs::write(&file, "in the way").unwrap();
         let said = UserFolder::within(&file).save(&preset("a"), None).unwrap_err();
-        assert!(said.starts_with("cannot write"), "{said}");
+        assert!(said.contains("cannot be read"), "{said}");
+        // It is not empty to the user either.
+        assert!(UserFolder::within(&file).read().broken[0].contains("cannot be read"));
     }
 }

@@ -2,7 +2,7 @@
 //! later. (A JACK server has ports of its own: [`jack`](super::jack).)
 //!
 //! midir calls back on a thread for each port. All of them push into one queue, which the audio thread empties at the
-//! beginning of each block. The *keyboards* thread looks once a second which ports have come and gone.
+//! beginning of each block. The *keyboards* thread looks five times a second which ports have come and gone.
 
 use std::collections::HashSet;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -17,6 +17,7 @@ use nice_plug::context::process::SendEventError;
 use nice_plug::prelude::*;
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::held_keys::HeldKeys;
 use crate::plugin::launch_options::LaunchOptions;
 
 /// What our own ports are called.
@@ -24,15 +25,13 @@ pub(super) const CLIENT: &str = "Chalumeau keyboards";
 /// In the name of the system's port that sends back what it gets.
 const THROUGH: &str = "midi through";
 
-/// How often the thread looks.
-const LOOK: Duration = Duration::from_secs(1);
+/// How often the thread looks. A device that is away for less than that keeps its name, and is not heard when it is back.
+const LOOK: Duration = Duration::from_millis(200);
 /// How long the program waits at its start for the first look.
 const BEGINNING: Duration = Duration::from_secs(2);
 /// Messages between two blocks; more are dropped.
 const QUEUE: usize = 1024;
 
-/// The sustain pedal.
-const SUSTAIN: u8 = 64;
 /// All notes off, on the first channel. The plugin heeds it on any.
 const ALL_NOTES_OFF: [u8; 3] = [0xB0, 123, 0];
 
@@ -40,16 +39,7 @@ const ALL_NOTES_OFF: [u8; 3] = [0xB0, 123, 0];
 /// global.
 static INCOMING: Mutex<Option<Consumer<Sent>>> = Mutex::new(None);
 
-/// What is down at one port.
-#[derive(Clone, Copy, Default)]
-struct Down {
-    /// The keys of each channel, a bit each.
-    keys: [u128; 16],
-    /// The channels whose sustain pedal is down, a bit each.
-    pedals: u16,
-}
-
-type Held = Arc<Mutex<Down>>;
+type Held = Arc<Mutex<HeldKeys>>;
 
 /// A message of up to three bytes, and how many they are.
 type Sent = ([u8; 3], usize);
@@ -140,10 +130,10 @@ impl State {
         self.open = stay;
         for Keyboard { name, held, .. } in gone {
             say(&format!("MIDI input gone: {name}"));
-            let others: Vec<Held> = self.open.iter().map(|keyboard| keyboard.held.clone()).collect();
             // Whoever played these notes cannot release them any more. Those of other keyboards go on.
-            let lock = |held: &Held| *held.lock().unwrap_or_else(PoisonError::into_inner);
-            for message in endings(&lock(&held), &others.iter().map(lock).collect::<Vec<_>>()) {
+            let down = |held: &Held| *held.lock().unwrap_or_else(PoisonError::into_inner);
+            let own = self.open.iter().fold(down(&held), |own, other| own.without(&down(&other.held)));
+            for message in own.endings() {
                 push(&self.queue, &message);
             }
             if self.open.is_empty() {
@@ -208,40 +198,11 @@ fn connected(
     let held = Held::default();
     let hears = held.clone();
     let hear = move |_stamp: u64, bytes: &[u8], _: &mut ()| {
-        note_keys(&mut hears.lock().unwrap_or_else(PoisonError::into_inner), bytes);
+        hears.lock().unwrap_or_else(PoisonError::into_inner).hear(bytes);
         push(&queue, bytes);
     };
     let connection = input.connect(port, "keyboard", hear, ()).map_err(|reason| reason.to_string())?;
     Ok((connection, held))
-}
-
-/// Remembers what a message puts down or lets go.
-fn note_keys(down: &mut Down, bytes: &[u8]) {
-    let &[status, first, second] = bytes else { return };
-    let (channel, key) = (usize::from(status & 15), 1 << (first & 127));
-    match status & 0xF0 {
-        0x90 if second > 0 => down.keys[channel] |= key,
-        0x80 | 0x90 => down.keys[channel] &= !key,
-        0xB0 if first == SUSTAIN && second >= 64 => down.pedals |= 1 << channel,
-        0xB0 if first == SUSTAIN => down.pedals &= !(1 << channel),
-        _ => {}
-    }
-}
-
-/// What ends the notes of a port that has gone: its pedals, and the keys that no other port holds.
-fn endings(gone: &Down, others: &[Down]) -> Vec<[u8; 3]> {
-    let mut all = Vec::new();
-    for channel in 0..16_u8 {
-        let at = usize::from(channel);
-        let is_elsewhere = others.iter().any(|other| other.pedals >> channel & 1 == 1);
-        if gone.pedals >> channel & 1 == 1 && !is_elsewhere {
-            all.push([0xB0 | channel, SUSTAIN, 0]);
-        }
-        let elsewhere = others.iter().fold(0, |keys, other| keys | other.keys[at]);
-        let ends = (0..128_u8).filter(|key| (gone.keys[at] & !elsewhere) >> key & 1 == 1);
-        all.extend(ends.map(|key| [0x80 | channel, key, 0]));
-    }
-    all
 }
 
 /// Only threads of MIDI wait here for each other.
@@ -321,34 +282,6 @@ impl<P: Plugin<SysExMessage = ()>, C: ProcessContext<P>> ProcessContext<P> for W
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// What is down after these messages.
-    fn after(messages: &[[u8; 3]]) -> Down {
-        let mut down = Down::default();
-        messages.iter().for_each(|bytes| note_keys(&mut down, bytes));
-        down
-    }
-
-    #[test]
-    fn a_port_that_goes_ends_its_own_notes_alone() {
-        let gone = after(&[
-            [0x90, 60, 100],
-            [0x90, 62, 90],
-            [0x90, 62, 0],
-            [0x95, 64, 1],
-            [0x85, 65, 0],
-            [0x90, 67, 80],
-            [0xB0, SUSTAIN, 64],
-            [0xB5, SUSTAIN, 63],
-            [0xB0, 1, 127],
-        ]);
-        let alone = endings(&gone, &[]);
-        assert_eq!(alone, [[0xB0, SUSTAIN, 0], [0x80, 60, 0], [0x80, 67, 0], [0x85, 64, 0]]);
-        // Another keyboard holds one of the keys, and the pedal; a third has the key of another channel.
-        let others = [after(&[[0x90, 60, 1], [0xB0, SUSTAIN, 127]]), after(&[[0x94, 64, 1]])];
-        assert_eq!(endings(&gone, &others), [[0x80, 67, 0], [0x85, 64, 0]]);
-        assert!(endings(&Down::default(), &others).is_empty());
-    }
 
     #[test]
     fn keyboards_play_unasked_and_knobs_and_loops_do_not() {

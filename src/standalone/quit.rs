@@ -2,6 +2,7 @@
 
 use std::process::{Command, ExitCode};
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use super::standalone_plugin::StandalonePlugin;
@@ -10,6 +11,8 @@ use crate::plugin::launch_options::LaunchOptions;
 /// How long the program may take to end by itself. A sound system that has died may never answer, and the framework waits
 /// for it.
 const PATIENCE: Duration = Duration::from_millis(1_500);
+/// How long the knob and the disk may take before that: a feel may be computed just now, a take written.
+const KNOB_PATIENCE: Duration = Duration::from_secs(4);
 
 /// Environment variable that tells the next start why the chosen devices have stopped this one.
 const FAILED: &str = "CHALUMEAU_DEVICES_FAILED";
@@ -34,14 +37,21 @@ pub fn begin(options: &'static LaunchOptions) {
     if options.quit.swap(true, Ordering::Relaxed) {
         return;
     }
+    let (saved, is_saved) = channel();
     let _ = std::thread::Builder::new().name("QuitWatch".to_owned()).spawn(move || {
-        std::thread::sleep(PATIENCE);
-        tell!("chalumeau-standalone: the sound system does not let go; ended without it");
+        if is_saved.recv_timeout(KNOB_PATIENCE).is_ok() {
+            std::thread::sleep(PATIENCE);
+            tell!("chalumeau-standalone: the sound system does not let go; ended without it");
+        } else {
+            tell!("chalumeau-standalone: the knob or the disk does not answer; ended without them");
+        }
         end(options);
         std::process::exit(0);
     });
-    // The sound system may never let the program come to the end at which it is saved, too.
+    // The sound system may never let the program come to the end, at which both are done, too.
+    StandalonePlugin::leave_knob();
     StandalonePlugin::save();
+    let _ = saved.send(());
     if !options.has_window || options.window_failed.load(Ordering::Relaxed) {
         StandalonePlugin::end();
         std::process::exit(0);

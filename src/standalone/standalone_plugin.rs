@@ -145,6 +145,15 @@ impl StandalonePlugin {
         }
     }
 
+    /// Takes the torque of the knob away and completes the take that is open.
+    pub fn leave_knob() {
+        // Not under the lock: others look for the plugin meanwhile.
+        let playing = locked(&PLAYING).clone();
+        if let Some(Self { plugin, .. }) = playing {
+            locked(&plugin).leave_knob();
+        }
+    }
+
     /// Writes the session of the plugin that plays.
     pub fn save() {
         if let Some(Self { session: Some(session), .. }) = &*locked(&PLAYING) {

@@ -455,6 +455,16 @@ fn devices_tests_and_files_are_asked_for() {
     }
     click(&mut window, "Page: Feel");
     assert_eq!(window.actions(), [Action::FeelTest(None)], "leaving the page ends the test");
+    let spring = Action::FeelTest(Some(FeelTest::Spring.feel()));
+    click(&mut window, "Page: Feel test");
+    click(&mut window, "Feel test: Spring");
+    click(&mut window, "Sound");
+    assert_eq!(window.actions(), [spring.clone(), Action::FeelTest(None)], "and so does leaving the view");
+    click(&mut window, "Knob");
+    click(&mut window, "Feel test: Spring");
+    assert_eq!(window.actions(), [spring]);
+    let actions = window.harness.state_mut().forget_settings();
+    assert_eq!(actions, [Action::FeelTest(None)], "and another project");
 
     let mut window = Window::tall(Tab::Instrument);
     click(&mut window, "Instrument Bass clarinet");

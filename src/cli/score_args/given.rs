@@ -40,13 +40,12 @@ pub(super) fn score_of_parts(
     playing: u128,
 ) -> (Score<PartEvent>, Unplayed) {
     let mut score = score_of(notes, rate);
-    if players < 2 {
-        return ((&score).into(), [0; 128]);
+    let mut parts = Parts::new(players.max(1));
+    if players > 1 {
+        parts.set_playing_keys(playing);
+        // As files have it: a key that comes up leaves its player to the next one. Otherwise a melody would go from player to player.
+        score.events.sort_by_key(|timed| (timed.at, !matches!(timed.event, Event::NoteOff { .. })));
     }
-    let mut parts = Parts::new(players);
-    parts.set_playing_keys(playing);
-    // As files have it: a key that comes up leaves its player to the next one. Otherwise a melody would go from player to player.
-    score.events.sort_by_key(|timed| (timed.at, !matches!(timed.event, Event::NoteOff { .. })));
     let mut events = Vec::new();
     for Timed { at, event } in score.events {
         match event {

@@ -21,6 +21,9 @@ use chalumeau_knob::touch::take::TakeRow;
 /// Who carries out the switches, in "... has stood still".
 const SWITCHES: &str = "the plugin's thread for the knob's switches";
 
+/// After a saved state has been loaded, how long a change of the knob may be part of it: the host sets one value after another.
+const LOADING: Duration = Duration::from_secs(1);
+
 /// How often the rows of a take are counted for the user.
 const COUNT_EVERY: Duration = Duration::from_secs(1);
 
@@ -35,6 +38,8 @@ pub struct KnobController {
     choice: KnobChoice,
     /// The knob that was chosen last, whether or not it is still.
     last_choice: Option<KnobChoice>,
+    /// How often a saved state has been loaded, and when that was noticed.
+    loaded: (u32, Option<Instant>),
     /// The serial number that this instance has put into the project for *any knob*.
     remembered: Option<u64>,
     /// Where the link's thread sends rows of takes.
@@ -66,6 +71,7 @@ impl KnobController {
             link: None,
             choice: KnobChoice::Off,
             last_choice: None,
+            loaded: (0, None),
             remembered: None,
             rows,
             angles: mpsc::channel(),
@@ -90,6 +96,9 @@ impl KnobController {
     fn cycle(&mut self) {
         let params = self.params.clone();
         let knob = &params.knob;
+        if params.loads() != self.loaded.0 {
+            self.loaded = (params.loads(), Some(Instant::now()));
+        }
         self.choose_device(knob);
         let status = self.link.as_ref().map(|(link, _)| link.status());
         match (&status, &self.link) {
@@ -156,7 +165,9 @@ impl KnobController {
             link.choose(wanted.clone());
         }
         if wanted != KnobChoice::Off {
-            if self.last_choice.as_ref().is_some_and(|last| is_another(last, &wanted)) {
+            // A saved state has the rest of its own knob.
+            let is_loaded = self.loaded.1.is_some_and(|at| at.elapsed() < LOADING);
+            if !is_loaded && self.last_choice.as_ref().is_some_and(|last| is_another(last, &wanted)) {
                 self.forget_rest(knob);
             }
             self.last_choice = Some(wanted.clone());
@@ -167,12 +178,7 @@ impl KnobController {
     /// What the link's thread calls: it asks for the feel, and reports each state of the knob.
     fn hooks(&self) -> Hooks {
         let shared = self.shared.clone();
-        let feel = move || {
-            if let Some(test) = shared.test.lock().ok().and_then(|test| *test) {
-                return Some(test);
-            }
-            Some(shared.feel_in_force()?.feel(shared.note()))
-        };
+        let feel = move || shared.tested().or_else(|| Some(shared.feel_in_force()?.feel(shared.note())));
         let (shared, rows, angles) = (self.shared.clone(), self.rows.clone(), self.angles.0.clone());
         let instrument = self.instrument.clone();
         let on_state = move |state: &StateSample| {

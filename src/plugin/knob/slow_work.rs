@@ -75,6 +75,8 @@ pub struct SlowWork {
     /// Rows that the link's thread sends.
     rows: mpsc::Receiver<TakeRow>,
     recorder: TakeRecorder,
+    /// *Record take* is still on, although nothing can be written.
+    has_failed: bool,
     /// The take that is replayed, and its path; empty for none.
     replayed: Option<Arc<Take>>,
     replay_path: String,
@@ -103,6 +105,7 @@ impl SlowWork {
             feel_inputs: None,
             rows,
             recorder: TakeRecorder::new(sound),
+            has_failed: false,
             replayed: None,
             replay_path: String::new(),
             texts: WorkTexts::default(),
@@ -236,19 +239,22 @@ impl SlowWork {
         if moments.take(Moment::Record) && !has_knob {
             self.texts.take = Some("nothing to record: choose a knob first".to_owned());
         }
-        moments.set_possible(Moment::Record, has_knob);
+        self.has_failed &= wanted;
+        let wanted = wanted && !self.has_failed;
+        moments.set_possible(Moment::Record, has_knob && !self.has_failed);
         let settings = self.params.settings().with_reed_factors(self.shared.reed_factors());
         let is_new = wanted && self.recorder.rows().is_none();
         let info = status.and_then(|status| status.info.as_ref());
         if is_new && let Err(reason) = self.recorder.begin(&self.params, &self.head(&settings, status), info)
         {
             self.params.moments.set_possible(Moment::Record, false);
+            self.has_failed = true;
             self.texts.take = Some(reason);
             return;
         }
         let mut marks = marks(&self.params, &settings);
-        if self.texts.refused.is_some() {
-            // The feel did not follow the sound, so these rows do not belong to a study.
+        if self.texts.refused.is_some() || self.shared.tested().is_some() {
+            // The feel does not follow the sound, so these rows do not belong to a study.
             marks.study = None;
         }
         self.shared.is_recording.store(wanted, Ordering::Relaxed);
@@ -257,7 +263,13 @@ impl SlowWork {
             self.recorder.take_in(moment, &marks);
         }
         self.recorder.write_known();
-        if !wanted && let Some(text) = self.recorder.end(&self.params) {
+        if self.recorder.has_failed() {
+            self.params.moments.set_possible(Moment::Record, false);
+            self.has_failed = true;
+        }
+        if (!wanted || self.has_failed)
+            && let Some(text) = self.recorder.end(&self.params)
+        {
             self.texts.take = Some(text);
         }
     }

@@ -1,13 +1,13 @@
 //! Records takes: their folder, their remarks, the marks of their rows. Also reads a take back.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::io;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::feel_design::feel_design;
 use super::heard_sound::SoundListener;
-use crate::output::NewFile;
+use crate::output::{KeptLines, NewFile, free_path};
 use crate::plugin::params::ChalumeauParams;
 use crate::take_file::{TakeFile, knob_in_words};
 use chalumeau_core::instrument::{BreathResponse, Settings};
@@ -33,10 +33,11 @@ pub struct TakeRecorder {
 /// A take that is being written.
 struct Recording {
     writer: TakeFile,
-    path: PathBuf,
     rows: u64,
-    /// Why a row could not be written.
-    error: Option<String>,
+    /// Why no more rows can be written.
+    error: Option<io::Error>,
+    /// How often a saved state had been loaded when it began.
+    loads: u32,
 }
 
 impl TakeRecorder {
@@ -53,7 +54,7 @@ impl TakeRecorder {
         knob: Option<&Info>,
     ) -> Result<(), String> {
         if self.recording.is_none() {
-            self.recording = Some(create(remarks(params, head, knob))?);
+            self.recording = Some(create(remarks(params, head, knob), params.loads())?);
         }
         Ok(())
     }
@@ -79,9 +80,17 @@ impl TakeRecorder {
             marks.heard = self.sound.at(moment.t_us);
             match recording.writer.write(&moment, &marks) {
                 Ok(()) => recording.rows += 1,
-                Err(reason) => recording.error = Some(reason.to_string()),
+                Err(reason) => {
+                    recording.error = Some(reason);
+                    return;
+                }
             }
         }
+    }
+
+    /// Nothing more can be written: the open take is to be ended.
+    pub fn has_failed(&self) -> bool {
+        self.recording.as_ref().is_some_and(|recording| recording.error.is_some())
     }
 
     /// Rows of the open take.
@@ -89,27 +98,33 @@ impl TakeRecorder {
         self.recording.as_ref().map(|recording| recording.rows)
     }
 
-    /// Completes the open take and makes it the take of the project. Returns a message for the user, if a take was open.
+    /// Completes the open take, as far as it could be written, and makes it the take of the project. Returns a message for the user, if a take was open.
     pub fn end(&mut self, params: &ChalumeauParams) -> Option<String> {
-        self.write_until(u64::MAX);
-        let Recording { writer, path, rows, error } = self.recording.take()?;
-        if rows == 0 {
+        if !self.has_failed() {
+            self.write_until(u64::MAX);
+        }
+        self.waiting.clear();
+        let Recording { writer, rows, error, loads } = self.recording.take()?;
+        if rows == 0 && error.is_none() {
             return Some("nothing recorded: the knob sent nothing".to_owned());
         }
-        let kept = match error {
-            Some(reason) => Err(reason),
-            None => writer.keep().map_err(|reason| reason.to_string()),
+        let KeptLines { path, cut } = match writer.keep_lines() {
+            Ok(kept) => kept,
+            Err(reason) => return Some(format!("take lost: {reason}")),
         };
-        Some(match kept {
-            Ok(()) => {
-                if let Ok(mut take) = params.knob.take.write() {
-                    *take = path.display().to_string();
-                }
-                params.host.state_changed();
-                format!("take {} has {rows} rows", path.display())
+        let path = path.display().to_string();
+        let text = match error.or(cut) {
+            Some(reason) => format!("take {path} ends early: {reason}"),
+            None => format!("take {path} has {rows} rows"),
+        };
+        // A project that has been loaded meanwhile has a take of its own.
+        if params.loads() == loads {
+            if let Ok(mut take) = params.knob.take.write() {
+                *take = path;
             }
-            Err(reason) => format!("take lost: {reason}"),
-        })
+            params.host.state_changed();
+        }
+        Some(text)
     }
 }
 
@@ -130,9 +145,11 @@ pub fn marks(params: &ChalumeauParams, settings: &Settings) -> TakeMarks {
 }
 
 /// Creates a new take in the folder of takes.
-fn create(remarks: Vec<String>) -> Result<Recording, String> {
-    let folder = match std::env::var_os(TAKES) {
-        Some(folder) => PathBuf::from(folder),
+fn create(remarks: Vec<String>, loads: u32) -> Result<Recording, String> {
+    let folder = match std::env::var_os(TAKES).filter(|folder| !folder.is_empty()) {
+        // A project holds the path, and is opened from other folders.
+        Some(folder) => std::path::absolute(&folder)
+            .map_err(|reason| format!("{TAKES} is {}: {reason}", folder.display()))?,
         None => dirs::document_dir()
             .or_else(dirs::data_dir)
             .ok_or_else(|| format!("no folder for takes; set {TAKES} to one"))?
@@ -143,19 +160,11 @@ fn create(remarks: Vec<String>) -> Result<Recording, String> {
         format!("cannot create {}: {reason}; set {TAKES} to another folder", folder.display())
     })?;
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let path = (0..1_000)
-        .map(|n| {
-            folder.join(if n == 0 {
-                format!("take-{seconds}.csv")
-            } else {
-                format!("take-{seconds}-{n}.csv")
-            })
-        })
-        .find(|path| !path.exists())
-        .ok_or_else(|| format!("{} has too many takes of this second", folder.display()))?;
-    let begun = NewFile::create(&path, false).and_then(|file| TakeFile::begin(file, remarks));
-    let writer = begun.map_err(|reason| reason.to_string())?;
-    Ok(Recording { writer, path, rows: 0, error: None })
+    let path = free_path(&folder.join(format!("take-{seconds}.csv")));
+    let writer = NewFile::create(&path, false)
+        .and_then(|file| TakeFile::begin(file, remarks))
+        .map_err(|reason| reason.to_string())?;
+    Ok(Recording { writer, rows: 0, error: None, loads })
 }
 
 /// The lines above a take's columns: program, knob, what is played and felt at the beginning, and the order of the study's trials.

@@ -246,7 +246,9 @@ impl NiceEguiApp for EditorApp {
         }
         let loads = params.loads();
         if std::mem::replace(&mut memory.loads, loads) != loads {
-            memory.state.forget_settings();
+            for action in memory.state.forget_settings() {
+                memory.act(action, &self.shared, &self.gui);
+            }
         }
         let mut snapshot = Snapshot::clone(&self.shared.latest());
         // What the mouse drags must follow in this frame.

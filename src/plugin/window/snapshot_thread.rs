@@ -107,21 +107,28 @@ impl SnapshotThread {
     pub(super) fn run(mut self) {
         while !self.shared.stop.load(Ordering::Relaxed) {
             let began = Instant::now();
+            self.act_on_files();
             let every = if self.shared.is_open.load(Ordering::Relaxed) { self.publish() } else { IDLE };
             std::thread::park_timeout(every.saturating_sub(began.elapsed()));
         }
+        // What was asked for just before the end.
+        self.act_on_files();
         // No thread may outlive the plugin's library.
         if let Some(analysing) = self.analysing.take() {
             let _ = analysing.join();
         }
     }
 
-    /// Makes one snapshot and asks the window to draw it. Returns the time from its beginning to the next one's.
-    fn publish(&mut self) -> Duration {
-        let inside = self.inside.read().clone();
+    /// Does what the window asks of files, also when it has closed since.
+    fn act_on_files(&mut self) {
         for task in self.shared.take_file_tasks() {
             self.files.act(task, &self.handles.params);
         }
+    }
+
+    /// Makes one snapshot and asks the window to draw it. Returns the time from its beginning to the next one's.
+    fn publish(&mut self) -> Duration {
+        let inside = self.inside.read().clone();
         let current = self.handles.instrument.current();
         self.receive_sound();
         self.analyse(current.as_ref());

@@ -1,7 +1,7 @@
 //! One client of a JACK server: its ports, and what they are connected to. [link thread]
 
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use jack::{AsyncClient, AudioIn, AudioOut, Client, ClientOptions, Error, MidiIn, MidiOut, PortFlags};
@@ -146,6 +146,16 @@ impl PlayingClient {
             plays_unasked(aliases.iter().chain([name]).map(String::as_str))
         };
         devices.into_iter().filter(plays).collect()
+    }
+
+    /// Ports of other programs and devices that have come since this was last asked.
+    pub fn new_ports(&self) -> Vec<String> {
+        std::mem::take(&mut self.signs.new_ports.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Ends the notes that are held: whoever played them has gone.
+    pub fn let_go(&self) {
+        self.signs.lets_go.store(true, Ordering::Relaxed);
     }
 
     /// Everything that the ports are connected to.

@@ -273,9 +273,15 @@ impl LinkThread {
         if self.connected_at.is_some_and(|at| at.elapsed() < CONNECTING) {
             return;
         }
-        self.connect(client);
+        let before = self.noted[1].clone();
+        let is_back = self.connect(client);
         self.noted.swap(0, 1);
         self.noted[1] = client.connections();
+        // A device has gone, or has been taken apart.
+        let is_lost = |old: &Connection| old.own == MIDI_INPUT && !self.noted[1].contains(old);
+        if is_back || before.iter().any(is_lost) {
+            client.let_go();
+        }
         self.tell_window();
     }
 
@@ -300,10 +306,11 @@ impl LinkThread {
         });
     }
 
-    /// Makes the connections whose ports are there. They are wanted again even if the server ends before the next look.
-    fn connect(&mut self, client: &PlayingClient) {
+    /// Makes the connections whose ports are there. They are wanted again even if the server ends before the next look. Returns
+    /// whether a device that was connected has been away meanwhile.
+    fn connect(&mut self, client: &PlayingClient) -> bool {
         self.connected_at = Some(Instant::now());
-        self.want_keyboards(client);
+        let is_back = self.want_keyboards(client);
         let pending = std::mem::take(&mut self.pending);
         let (made, pending): (Vec<_>, _) =
             pending.into_iter().partition(|connection| client.connect(connection));
@@ -311,17 +318,25 @@ impl LinkThread {
         for noted in &mut self.noted {
             noted.extend(made.iter().filter(|made| !noted.contains(made)).cloned().collect::<Vec<_>>());
         }
+        is_back
     }
 
-    /// Wants devices that are new. What the user takes apart stays apart until the device is plugged in again.
-    fn want_keyboards(&mut self, client: &PlayingClient) {
-        let Some(known) = &mut self.keyboards else { return };
+    /// Wants devices that are new. What the user takes apart stays apart until the device is plugged in again. Returns whether one
+    /// that was connected has been away: by its name alone it would be the same.
+    fn want_keyboards(&mut self, client: &PlayingClient) -> bool {
+        let new = client.new_ports();
+        let was_connected =
+            |name: &String| self.noted[1].iter().any(|noted| noted.own == MIDI_INPUT && noted.other == *name);
+        let is_back = new.iter().any(was_connected);
+        let Some(known) = &mut self.keyboards else { return is_back };
+        known.retain(|name| !new.contains(name));
         let there: HashSet<_> = client.keyboards().into_iter().collect();
         for other in there.difference(known) {
             tell!("chalumeau-standalone: MIDI input: {other}");
             self.pending.push(Connection { own: MIDI_INPUT, other: other.clone() });
         }
         *known = there;
+        is_back
     }
 
     /// Wants what was connected to be connected again.

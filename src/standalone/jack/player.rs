@@ -1,7 +1,7 @@
 //! Plays the plugin in the cycles of a JACK server. Real-time safe. [JACK thread]
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use jack::{
     AudioIn, AudioOut, Client, ClientStatus, Control, MidiIn, MidiIter, MidiOut, Port, ProcessScope, RawMidi,
@@ -13,6 +13,7 @@ use nice_plug::prelude::*;
 
 use crate::plugin::Chalumeau;
 use crate::standalone::devices;
+use crate::standalone::held_keys::{Endings, HeldKeys};
 use chalumeau_knob::touch::breath_from_angle::GRID;
 
 /// Longest cycle of a JACK server, samples.
@@ -27,6 +28,10 @@ pub struct JackSigns {
     pub cycles: AtomicU32,
     /// The server has gone.
     pub is_over: AtomicBool,
+    /// A device has gone that may have held keys.
+    pub lets_go: AtomicBool,
+    /// Ports that have come since the link thread last looked.
+    pub new_ports: Mutex<Vec<String>>,
 }
 
 /// The ports of the plugin.
@@ -44,6 +49,8 @@ pub struct JackPlayer {
     ports: JackPlayerPorts,
     sent: Vec<NoteEvent<()>>,
     transport: Transport,
+    /// What is down at the MIDI input, whoever holds it.
+    held: HeldKeys,
 }
 
 impl JackPlayer {
@@ -54,15 +61,24 @@ impl JackPlayer {
         ports: JackPlayerPorts,
         rate_hz: f32,
     ) -> Self {
-        Self { plugin, signs, ports, sent: Vec::with_capacity(SENT_MOST), transport: Transport::new(rate_hz) }
+        let (sent, transport) = (Vec::with_capacity(SENT_MOST), Transport::new(rate_hz));
+        Self { plugin, signs, ports, sent, transport, held: HeldKeys::default() }
     }
 
     fn play(&mut self, scope: &ProcessScope) {
         let JackPlayerPorts { outputs, microphone, midi_input, midi_output } = &mut self.ports;
         let mut channels = outputs.each_mut().map(|port| port.as_mut_slice(scope));
         self.sent.clear();
+        // JACK does not say whose keys are down. Those of another device end, too.
+        let let_go = if self.signs.lets_go.swap(false, Ordering::Relaxed) {
+            std::mem::take(&mut self.held)
+        } else {
+            HeldKeys::default()
+        };
         let mut context = CycleContext {
+            endings: let_go.endings(),
             incoming: midi_input.iter(scope),
+            held: &mut self.held,
             frames: scope.n_frames(),
             sent: &mut self.sent,
             transport: &self.transport,
@@ -98,10 +114,17 @@ impl jack::ProcessHandler for JackPlayer {
     }
 }
 
-/// Hears of the server's end.
+/// Hears of the server's end, and of new ports.
 pub struct JackNotices(pub Arc<JackSigns>);
 
 impl jack::NotificationHandler for JackNotices {
+    fn port_registration(&mut self, client: &Client, port: jack::PortId, is_new: bool) {
+        let name = client.port_by_id(port).filter(|_| is_new).and_then(|port| port.name().ok());
+        if let Some(name) = name {
+            self.0.new_ports.lock().unwrap_or_else(PoisonError::into_inner).push(name);
+        }
+    }
+
     #[allow(unsafe_code)] // The trait demands it: this may run like a signal handler. It only sets a flag.
     unsafe fn shutdown(&mut self, _: ClientStatus, _: &str) {
         self.0.is_over.store(true, Ordering::Relaxed);
@@ -110,7 +133,10 @@ impl jack::NotificationHandler for JackNotices {
 
 /// One cycle, as the plugin sees it.
 struct CycleContext<'a> {
+    /// What ends the notes of a device that has gone.
+    endings: Endings,
     incoming: MidiIter<'a>,
+    held: &'a mut HeldKeys,
     frames: u32,
     sent: &'a mut Vec<NoteEvent<()>>,
     transport: &'a Transport,
@@ -131,9 +157,16 @@ impl ProcessContext<Chalumeau> for CycleContext<'_> {
     }
 
     fn next_event(&mut self) -> Option<NoteEvent<()>> {
+        if let Some(event) = self.endings.find_map(|bytes| NoteEvent::from_midi(0, &bytes).ok()) {
+            return Some(event);
+        }
         let last = self.frames.saturating_sub(1);
+        let Self { incoming, held, .. } = self;
         // What is no note event is skipped.
-        self.incoming.find_map(|midi| NoteEvent::from_midi(midi.time.min(last), midi.bytes).ok())
+        incoming.find_map(|midi| {
+            held.hear(midi.bytes);
+            NoteEvent::from_midi(midi.time.min(last), midi.bytes).ok()
+        })
     }
 
     fn try_send_event(&mut self, event: NoteEvent<()>) -> Result<(), (NoteEvent<()>, SendEventError)> {

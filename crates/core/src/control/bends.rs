@@ -41,7 +41,7 @@ impl Wheel {
 /// Wheels and zones. Everything is real-time safe; channels are 0..=15.
 ///
 /// `heard` is the channel of the note that sounds or sounded last, if there was one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Bends {
     wheels: [Wheel; 16],
     /// Bend range of the wheels that were not told one, semitones.
@@ -71,11 +71,13 @@ impl Bends {
 
     /// What the wheels bend the heard note by, cents.
     pub fn cents(&self, heard: Option<usize>) -> f32 {
-        let Some(channel) = heard else { return self.common_cents(None) };
+        let common_cents = self.common.map_or(0.0, |at| self.bend_cents(at));
+        let Some(channel) = heard else { return common_cents };
         let manager_cents = match self.zone_of(channel) {
             Some(zone) if MANAGERS[zone] == channel => 0.0,
             Some(zone) => self.bend_cents(MANAGERS[zone]),
-            None => self.common_cents(Some(channel)),
+            None if self.is_common(channel) => common_cents,
+            None => 0.0,
         };
         self.bend_cents(channel) + manager_cents
     }
@@ -84,8 +86,9 @@ impl Bends {
         self.wheels[channel].bend_cents(self.usual)
     }
 
-    fn common_cents(&self, but: Option<usize>) -> f32 {
-        self.common.filter(|&channel| Some(channel) != but).map_or(0.0, |at| self.bend_cents(at))
+    /// Whether the common wheel bends the notes of a channel outside the zones: it is another one's, and no zone's.
+    fn is_common(&self, channel: usize) -> bool {
+        self.common.is_some_and(|common| common != channel && self.zone_of(common).is_none())
     }
 
     /// The zone a channel manages or is a member of.
@@ -109,7 +112,7 @@ impl Bends {
         heard == channel
             || match self.zone_of(heard) {
                 Some(zone) => MANAGERS[zone] == channel,
-                None => self.common == Some(channel),
+                None => self.common == Some(channel) && self.is_common(heard),
             }
     }
 
@@ -119,6 +122,14 @@ impl Bends {
         if !self.wheels[channel].played && self.zone_of(channel).is_none_or(|zone| MANAGERS[zone] == channel)
         {
             self.common = Some(channel);
+        }
+    }
+
+    /// Takes the zones and ranges that were told back to where they were; wheels stay.
+    pub fn take_back_ranges(&mut self, before: &Self) {
+        self.members = before.members;
+        for (wheel, before) in self.wheels.iter_mut().zip(&before.wheels) {
+            (wheel.semitones, wheel.cents) = (before.semitones, before.cents);
         }
     }
 

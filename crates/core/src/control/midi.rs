@@ -79,8 +79,6 @@ pub struct MidiDecoder {
     notes: Notes,
     /// The keys as the player holds them, who gets the events.
     fingers: Keys,
-    /// Velocity of the last key, 0..=1.
-    velocity: f32,
     /// The last pressure on keys there was an event for.
     key_pressure: f32,
     bends: Bends,
@@ -107,7 +105,7 @@ impl MidiDecoder {
     /// Forgets notes, controllers and breath source, and also links, what the wheel does, which controllers may blow, and the usual
     /// bend range; all but MPE zones and the bend ranges that were told, which a device tells once. Real-time safe.
     pub fn reset(&mut self) {
-        *self = Self { bends: self.bends.clone().at_rest(), ..Self::new() };
+        *self = Self { bends: self.bends.at_rest(), ..Self::new() };
     }
 
     /// Bend range until RPN 0 says otherwise, semitones; of MPE members it is 48. Real-time safe.
@@ -167,10 +165,10 @@ impl MidiDecoder {
     pub fn strike(&mut self, note: Note, velocity: u8) -> &[Event] {
         self.begin();
         let note = Note { channel: note.channel % 16, key: note.key.min(127), ..note };
-        self.velocity = f32::from(velocity.clamp(1, 127)) / 127.0;
+        let velocity = f32::from(velocity.clamp(1, 127)) / 127.0;
         let by_pedal = self.notes.take_by_pedal();
         let is_repeated = self.sounding().or(by_pedal).is_some_and(|before| before.key == note.key);
-        self.notes.press(note);
+        self.notes.press(note, velocity);
         self.prepare_note(note.channel);
         self.leave_note_breath();
         // A finger that does not press yet is about to.
@@ -179,7 +177,7 @@ impl MidiDecoder {
         if is_repeated {
             self.lift(note.key);
         }
-        self.finger(note.key);
+        self.finger(note.key, velocity);
         self.lift_others(None);
         self.said.events()
     }
@@ -442,27 +440,28 @@ impl MidiDecoder {
     /// Keys have come up, and `before` sounded until now: what is heard now, and which keys are no longer down.
     fn hear_next(&mut self, before: Option<Note>) {
         self.rebend();
-        if let Some(Note { key, .. }) = self.sounding().filter(|&now| Some(now) != before) {
+        let now = self.notes.sounding().map(|held| (held.note, held.velocity));
+        if let Some((Note { key, .. }, velocity)) = now.filter(|&(now, _)| Some(now) != before) {
             self.blow_note();
             self.blow_member(|_| true);
             self.remix();
             let next = self.fingers.held().iter().rev().find(|finger| self.notes.holds(finger.0));
             if next != Some(&SoundingNote(key)) {
                 // Of two notes of one key the later one has come up; the earlier one lies below others.
-                self.finger(key);
+                self.finger(key, velocity);
             }
         }
         self.lift_others(None);
     }
 
     /// A key goes down for the player.
-    fn finger(&mut self, key: u8) {
+    fn finger(&mut self, key: u8, velocity: f32) {
         let note = SoundingNote(key);
         // The player may not play all keys, so that it would push another one out, or none.
         if let Some(note) = self.fingers.press(note) {
             self.said.push(Event::NoteOff { note });
         }
-        self.said.push(Event::NoteOn { note, velocity: self.velocity });
+        self.said.push(Event::NoteOn { note, velocity });
     }
 
     /// A key comes up for the player.

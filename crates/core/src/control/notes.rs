@@ -72,6 +72,8 @@ pub enum NoteExpression {
 pub struct HeldNote {
     /// The note.
     pub note: Note,
+    /// How fast its key went down, 0..=1.
+    pub velocity: f32,
     /// Pitch above the key, cents.
     pub tuning_cents: f32,
     /// Factor on the amplitude, 0..=4.
@@ -91,9 +93,10 @@ pub struct HeldNote {
 }
 
 impl HeldNote {
-    fn new(note: Note) -> Self {
+    fn new(note: Note, velocity: f32) -> Self {
         Self {
             note,
+            velocity,
             tuning_cents: 0.0,
             gain: 1.0,
             pan: 0.0,
@@ -137,7 +140,7 @@ pub struct Notes {
 impl Default for Notes {
     fn default() -> Self {
         Self {
-            held: [HeldNote::new(Note::default()); MOST],
+            held: [HeldNote::new(Note::default(), 0.0); MOST],
             count: 0,
             released: None,
             fading: None,
@@ -189,7 +192,7 @@ impl Notes {
     }
 
     /// A note begins; again, if it was held.
-    pub fn press(&mut self, note: Note) {
+    pub fn press(&mut self, note: Note, velocity: f32) {
         let again = self.held().iter().find(|held| held.note == note && note.id.is_none());
         let ends_to_pass = again.map_or(0, |held| held.ends_to_pass.saturating_add(1));
         self.remove_where(|held| held.note == note, |_, _| ());
@@ -201,7 +204,7 @@ impl Notes {
             self.end(fading);
         }
         self.released = None;
-        self.held[self.count] = HeldNote { ends_to_pass, ..HeldNote::new(note) };
+        self.held[self.count] = HeldNote { ends_to_pass, ..HeldNote::new(note, velocity) };
         self.count += 1;
     }
 
@@ -266,7 +269,7 @@ impl Notes {
 
     /// Forgets what belonged to the last note, which was cut.
     pub fn make_plain(&mut self) {
-        self.released = self.released.map(|released| HeldNote::new(released.note));
+        self.released = self.released.map(|released| HeldNote::new(released.note, released.velocity));
     }
 
     /// Takes away the note that the pedal holds, which is then held alone.

@@ -364,7 +364,13 @@ impl Parts {
     fn part_for(&self, note: Note) -> usize {
         let claim = |part: &MidiDecoder| {
             let rank = match part.held() {
+                // A host may give each note another id. A key whose note only the pedal holds is struck again.
                 held if held.iter().any(|held| held.note == note) => 0,
+                [held]
+                    if part.is_by_pedal() && NoteAddress::of_key(note.channel, note.key).fits(held.note) =>
+                {
+                    0
+                }
                 [] => 1,
                 _ if part.is_by_pedal() => 2,
                 _ => 3,

@@ -174,6 +174,8 @@ impl WindMeter {
     pub fn calibrate(&mut self) {
         self.taken = Some(0);
         (self.is_open, self.breath, self.loud_dbfs) = (false, 0.0, LOUD_DBFS);
+        // Who blew before has stopped.
+        (self.wind_s, self.unvoiced_s, self.calm_s) = (0.0, 0.0, 0.0);
     }
 
     /// Whether the room is being measured.

@@ -191,7 +191,15 @@ impl Clarinet {
     pub fn set_settings(&mut self, settings: &Settings) {
         self.player.set_settings(settings);
         self.level.set(self.player.settings());
+        if self.is_silent() {
+            self.level.settle();
+        }
         self.listen();
+    }
+
+    /// The gain of the settings is there at once: nobody hears this one. Real-time safe.
+    pub(super) fn settle_level(&mut self) {
+        self.level.settle();
     }
 
     /// Sits down on a chair. Real-time safe.

@@ -94,6 +94,14 @@ impl Seat {
         }
     }
 
+    fn set_settings(&mut self, settings: &Settings) {
+        self.clarinet.set_settings(settings);
+        if self.sleeps {
+            // Otherwise the next note would begin as loud as before, and go to the new level meanwhile.
+            self.clarinet.settle_level();
+        }
+    }
+
     fn apply(&mut self, event: Event) {
         self.clarinet.apply(event);
         if self.sleeps && matches!(event, Event::Choke { .. }) {
@@ -118,7 +126,12 @@ impl Seat {
             | Event::TryHoles(_)
             | Event::Hole { .. } => self.lateness.take(event, most),
             Event::Panic => {
-                self.lateness.forget();
+                // What a wheel or a key switch has said stays, in every player.
+                while let Some(event) = self.lateness.next() {
+                    if !is_of_key(event) {
+                        self.apply(event);
+                    }
+                }
                 Some(event)
             }
             // What is cut has begun.
@@ -203,6 +216,11 @@ impl Seat {
         (self.pan, self.is_heard, self.quiet) = (0.0, false, 0);
         self.sleeps = self.may_sleep;
     }
+}
+
+/// Whether a key or a tongue makes the event.
+fn is_of_key(event: Event) -> bool {
+    matches!(event, Event::NoteOn { .. } | Event::NoteOff { .. } | Event::TongueSlap { .. })
 }
 
 /// Adds a player's samples to the sum; the first one's take its place, so that a zero keeps its sign.
@@ -306,7 +324,7 @@ impl Ensemble {
         let before = std::mem::replace(&mut self.players, players);
         let listening = self.seats[0].clarinet.settings().listening;
         for seat in &mut self.seats[..players.number()] {
-            seat.clarinet.set_settings(settings);
+            seat.set_settings(settings);
         }
         if before == players {
             if listening != self.seats[0].clarinet.settings().listening {
@@ -349,7 +367,7 @@ impl Ensemble {
         {
             let mut settings = *seat.clarinet.settings();
             *settings.number(number) = value;
-            seat.clarinet.set_settings(&settings);
+            seat.set_settings(&settings);
         }
         // The number of players and what they do with the notes are no such numbers: only seats and places can have moved.
         let settings = self.seats[0].clarinet.settings();

@@ -108,10 +108,13 @@ impl Score {
         for (index, &written) in notes.iter().enumerate() {
             let note = written.sounding(transposition).ok_or(ScoreError::OutsideMidi(written))?;
             let start = samples_in(index as f64 * seconds, rate);
-            events.push(Timed { at: start, event: Event::NoteOn { note, velocity: PLAIN_VELOCITY } });
-            if let Some(note) = last.filter(|_| slurred) {
-                // The old key comes up after the next one is down: a slur, in which the reed keeps vibrating.
-                events.push(Timed { at: start, event: Event::NoteOff { note } });
+            // A note that is slurred to itself is held.
+            if !slurred || last != Some(note) {
+                events.push(Timed { at: start, event: Event::NoteOn { note, velocity: PLAIN_VELOCITY } });
+                if let Some(note) = last.filter(|_| slurred) {
+                    // The old key comes up after the next one is down: a slur, in which the reed keeps vibrating.
+                    events.push(Timed { at: start, event: Event::NoteOff { note } });
+                }
             }
             end = samples_in((index + 1) as f64 * seconds, rate);
             if !slurred {
@@ -189,6 +192,23 @@ mod tests {
             assert_eq!(scale.samples, 13 * 12_000);
             assert!(scale.events.is_sorted_by_key(|e| e.at));
         }
+    }
+
+    #[test]
+    fn a_note_that_is_slurred_to_itself_is_held() {
+        let notes = [60, 60, 62].map(WrittenNote);
+        let score = Score::one_after_another(&notes, 0, 0.5, true, 1_000).unwrap();
+        let heard: Vec<(usize, bool, u8)> = score
+            .events
+            .iter()
+            .filter_map(|timed| match timed.event {
+                Event::NoteOn { note, .. } => Some((timed.at, true, note.0)),
+                Event::NoteOff { note } => Some((timed.at, false, note.0)),
+                _ => None,
+            })
+            .collect();
+        let wanted = [(0, true, 60), (1_000, true, 62), (1_000, false, 60), (1_500, false, 62)];
+        assert_eq!(heard, wanted);
     }
 
     #[test]

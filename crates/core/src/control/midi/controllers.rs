@@ -6,6 +6,7 @@ use super::mix::MixControllers;
 use super::snapshot::{PRESSURE, Place, Run};
 use super::techniques::TechniqueControllers;
 use super::{BreathOrigin, MidiDecoder};
+use crate::control::bends::Bends;
 use crate::event::Event;
 
 const BREATH: u8 = 2;
@@ -39,12 +40,13 @@ const RPN_NONE: [u8; 2] = [127, 127];
 const RPN_BEND_RANGE: [u8; 2] = [0, 0];
 const RPN_MPE_ZONE: [u8; 2] = [0, 6];
 
-/// Where controllers and pedal were before a run.
+/// Where controllers, bend ranges and pedal were before a run.
 #[derive(Clone, Copy, Debug, Default)]
 struct Before {
     mix: MixControllers,
     techniques: TechniqueControllers,
     links: Raws,
+    bends: Bends,
     pedal: bool,
 }
 
@@ -178,13 +180,14 @@ impl MidiDecoder {
                 mix: self.mix.controllers,
                 techniques: self.techniques.controllers,
                 links: self.links.raws(),
+                bends: self.bends,
                 pedal: self.pedal,
             };
         }
         let place = channel.run.place(controller);
         if place == Place::Recognised {
             channel.rpn = RPN_NONE;
-            let Before { mix, techniques, links, pedal } = channel.before;
+            let Before { mix, techniques, links, bends, pedal } = channel.before;
             self.breath.forget_waiting(at);
             (self.mix.controllers, self.techniques.controllers) = (mix, techniques);
             self.remix();
@@ -192,6 +195,9 @@ impl MidiDecoder {
             self.linked_breath = None;
             let taken_back = self.links.go_back(&links).filter(|event| !matches!(event, Event::Breath(_)));
             taken_back.for_each(|event| self.said.push(event));
+            // A registered parameter may have been selected before.
+            self.bends.take_back_ranges(&bends);
+            self.rebend();
             self.set_pedal(pedal);
         }
         place

@@ -211,6 +211,56 @@ fn a_snapshot_of_all_controllers_changes_nothing() {
 }
 
 #[test]
+fn a_snapshot_leaves_zones_and_bend_ranges_as_they_were_told() {
+    for value in [0, 1, 64, 127] {
+        let mut midi = MidiDecoder::new();
+        // Nothing deselects the parameter afterwards.
+        for (cc, told) in [(101, 0), (100, 6), (6, 7)] {
+            midi.controller(0, cc, told);
+        }
+        for (cc, told) in [(101, 0), (100, 0), (6, 12)] {
+            midi.controller(9, cc, told);
+        }
+        midi.note_on(1, 60, 90);
+        midi.note_off(1, 60);
+        snapshot(&mut midi, 0, 1, |_| value);
+        snapshot(&mut midi, 9, 1, |_| value);
+        midi.note_on(1, 60, 90);
+        assert_eq!(midi.bend(1, 16383), [bend(4_800.0)], "{value}");
+        midi.note_on(9, 62, 90);
+        assert_eq!(midi.bend(9, 16383), [bend(1_200.0)], "{value}");
+    }
+}
+
+#[test]
+fn a_managers_wheel_bends_its_zone_alone() {
+    let mut midi = MidiDecoder::new();
+    for (cc, told) in [(101, 0), (100, 6), (6, 7)] {
+        midi.controller(0, cc, told);
+    }
+    midi.note_on(9, 60, 90);
+    assert_eq!(midi.bend(0, 16383), NOTHING);
+    midi.note_on(2, 62, 90);
+    assert_eq!(midi.bend(0, 0), [bend(-200.0)]);
+    // Before the first note it is heard by whoever plays it.
+    let mut midi = MidiDecoder::new().with_mpe();
+    assert_eq!(midi.bend(0, 16383), [bend(200.0)]);
+    assert_eq!(midi.note_on(1, 60, 127), [on(60)]);
+}
+
+#[test]
+fn a_note_that_is_heard_again_has_its_own_velocity() {
+    let mut midi = MidiDecoder::new();
+    let note = |id| Note { id: Some(id), channel: 0, key: 60 };
+    let struck =
+        |velocity: u8| Event::NoteOn { note: SoundingNote(60), velocity: f32::from(velocity) / 127.0 };
+    assert_eq!(midi.strike(note(1), 30), [struck(30)]);
+    assert_eq!(midi.strike(note(2), 120), [off(60), struck(120)]);
+    let address = NoteAddress { id: Some(2), ..NoteAddress::default() };
+    assert_eq!(midi.choke(address).last(), Some(&struck(30)));
+}
+
+#[test]
 fn breath_after_a_snapshot_is_breath() {
     let mut midi = MidiDecoder::new();
     snapshot(&mut midi, 0, 1, |_| 64);

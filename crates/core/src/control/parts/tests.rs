@@ -100,6 +100,22 @@ fn a_note_that_the_pedal_holds_gives_way_before_a_held_one() {
 }
 
 #[test]
+fn a_key_that_the_pedal_holds_is_struck_again_by_the_same_player_with_ids_and_without() {
+    for ids in [[None; 3], [Some(1), Some(2), Some(3)]] {
+        let mut parts = Parts::new(3);
+        parts.controller(0, 64, 127);
+        for id in ids {
+            let note = Note { id, channel: 0, key: 60 };
+            let told = said(parts.strike(note, 100));
+            assert!(told.iter().all(|(part, _)| *part == 0), "{told:?}");
+            assert_eq!(told.last(), Some(&on(0, 60)));
+            parts.release(NoteAddress { id, channel: Some(0), key: Some(60) });
+        }
+        assert_eq!(said(parts.controller(0, 64, 0)), [off(0, 60)]);
+    }
+}
+
+#[test]
 fn bends_pressure_and_breath_of_a_member_channel_are_for_its_note() {
     let mut parts = Parts::of(MidiDecoder::new().with_mpe(), 3);
     parts.pressure(1, 40);

@@ -545,6 +545,49 @@ fn panic_and_choke_leave_no_note_that_waits() {
 }
 
 #[test]
+fn a_wheel_that_waits_is_not_lost_when_a_host_stops() {
+    let mut section = section_of(6, 60.0);
+    section.apply(Event::Bend { cents: 200.0 }.into());
+    section.apply(on(60).into());
+    section.render(&mut vec![0.0; 4_800]);
+    section.apply(Event::Bend { cents: 0.0 }.into());
+    section.apply(Event::Panic.into());
+    section.apply(on(60).into());
+    section.render(&mut vec![0.0; 24_000]);
+    for seat in &mut section.seats[..6] {
+        let mut sound = vec![0.0; 9_600];
+        seat.clarinet.render(&mut sound);
+        let sound: Vec<f64> = sound.into_iter().map(f64::from).collect();
+        let cents = 1_200.0 * (pitch::refine_hz(&sound, RATE_HZ, 261.6).unwrap() / 261.626).log2();
+        assert!(cents.abs() < 40.0, "{cents}");
+    }
+}
+
+#[test]
+fn who_sleeps_begins_the_next_note_as_loud_as_it_is_to_be() {
+    let players = Players { count: 4, ..Players::default() };
+    let gain = |gain_db| Settings { gain_db, players, ..Settings::default() };
+    let begun = |first_db, then_db| {
+        let mut quartet = Ensemble::built_in(RATE_HZ).unwrap();
+        quartet.set_settings(&gain(first_db));
+        quartet.apply(to(1, on(60)));
+        quartet.render(&mut vec![0.0; 9_600]);
+        quartet.apply(to(1, off(60)));
+        quartet.render(&mut vec![0.0; 240_000]);
+        assert!(quartet.seats[1].sleeps);
+        quartet.set_settings(&gain(then_db));
+        quartet.apply(to(1, on(60)));
+        let mut sound = vec![0.0; 2_400];
+        quartet.render(&mut sound);
+        sound
+    };
+    let (changed, always) = (begun(-2.5, -20.0), begun(-20.0, -20.0));
+    let louder = power(&changed) / power(&always);
+    // Without it, the first 50 ms are 4.5 times as strong.
+    assert!((louder - 1.0).abs() < 0.05, "{louder}");
+}
+
+#[test]
 fn what_waits_goes_on_in_another_ensemble_and_is_dropped_where_players_go() {
     let waits = |section: &Ensemble| section.seats.iter().filter(|seat| !seat.lateness.is_empty()).count();
     let mut section = section_of(6, 60.0);

@@ -108,7 +108,8 @@ impl Inflection {
                 self.go(Phase::Rises, 0.0, articulation.scoop_s.into());
             }
             Phase::Rises | Phase::Returns if arrived => *self = Self::default(),
-            Phase::Falls if arrived => {
+            // Without breath the note has ended; breath that came back would sound it without a key.
+            Phase::Falls if arrived || gamma < FADED_GAMMA => {
                 self.go(Phase::Stays, self.to, STAY_S);
                 return true;
             }
@@ -171,6 +172,14 @@ mod tests {
             ended.len() == 1 && (3_998..4_003).contains(&ended[0]),
             "the first fall was cut off: {ended:?}"
         );
+    }
+
+    #[test]
+    fn a_fall_ends_with_its_breath() {
+        let asked = Articulation { fall_cents: 400.0, fall_s: 2.0, ..Articulation::default() };
+        let mut inflection = Inflection::default();
+        assert!(inflection.fall(&asked, 0.5) && !inflection.tick(false, 0.5, &asked, TICK_S));
+        assert!(inflection.tick(false, 0.1, &asked, TICK_S) && !inflection.is_falling());
     }
 
     #[test]

@@ -137,17 +137,20 @@ impl Response {
         settings: &Settings,
         posture: &mut Posture,
     ) -> f64 {
+        let shaped = |dynamic: f64| bodily.fade * bodily.onset.shaped(settings.attack, dynamic);
         let (wanted, of_softest) = match asked {
             // The lip stays while the breath ends.
             Asked::Nothing => (self.lip.unwrap_or(0.0), 0.0),
-            Asked::Level(level) => dynamic(level, settings),
+            Asked::Level(level) => {
+                let (dynamic, of_softest) = dynamic(level, settings);
+                (shaped(dynamic), of_softest)
+            }
             Asked::Velocity(velocity) => {
                 let (soft, loud) = VELOCITY_DYNAMIC;
-                (soft + (loud - soft) * velocity, 1.0)
+                (shaped(soft + (loud - soft) * velocity), 1.0)
             }
         };
         self.is_below = of_softest < 1.0;
-        let wanted = bodily.fade * bodily.onset.shaped(settings.attack, wanted);
         let lip = match self.lip {
             Some(lip) if !bodily.settles => lip + (wanted - lip) * posture.lags.lip,
             _ => wanted,
