@@ -1102,6 +1102,10 @@ fn a_report_is_of_one_player() {
             &["inside one instrument", "--players and --tracks"],
         );
     }
+    for line in ["--written C4", "--tour"] {
+        let refusal = ["--open-holes is for `render`"];
+        refused(&d, &format!("report {line} --open-holes REG --out a.html"), &refusal);
+    }
 }
 
 #[test]

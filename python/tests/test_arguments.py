@@ -22,6 +22,24 @@ def test_numbers_of_numpy_and_whole_floats_are_taken():
     assert [chalumeau.note(one) for one in ("E♭4", "C♯4", " C4 ", 60.0, np.uint8(60))] == [63, 61, 60, 60, 60]
 
 
+def test_no_open_hole_shuts_all_and_paths_are_taken(tmp_path):
+    render = {"written": "C4", "seconds": 0.1}
+    shut = chalumeau.render(open_holes=[], **render)
+    assert (shut != chalumeau.render(**render)).any()
+    [lowest] = [each["open"] for each in chalumeau.fingerings() if each["written"] == "E3"]
+    assert lowest == [] and (shut == chalumeau.render(open_holes=lowest, **render)).all()
+    curve = tmp_path / "breath.csv"
+    curve.write_text("t_s,gamma\n0,0.5\n1,0.5\n")
+    assert (chalumeau.render(breath=curve, **render) == chalumeau.render(breath=str(curve), **render)).all()
+
+
+def test_notes_of_one_key_that_overlap_each_last_until_their_own_end():
+    sound = chalumeau.render([(0, 0.4, "C4", 0.6), (0.2, 0.4, "C4", 0.6)], channels=1)
+    level = np.sqrt(np.mean(np.square(sound[int(0.5 * 48_000) : int(0.58 * 48_000)])))
+    # The end of the first one, at 0.4 s, ends nothing.
+    assert level > 1e-2
+
+
 def test_ones_are_switches():
     by = [chalumeau.render(written="C4", seconds=0.05, no_noise=on) for on in (True, 1)]
     assert (by[0] == by[1]).all()

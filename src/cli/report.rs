@@ -71,10 +71,10 @@ pub struct ReportCommand {
 impl ReportCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.refuse_names()?;
+        self.play.refuse_open_holes()?;
         if self.tour {
             return self.write_tour();
         }
-        self.play.refuse_open_holes()?;
         let prepared = self.play.prepare()?;
         refuse_several_players(&prepared)?;
         prepared.warn();

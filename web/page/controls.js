@@ -123,6 +123,8 @@ export class Control {
   }
 
   key(event) {
+    // Back and forward, for example.
+    if (event.altKey || event.ctrlKey || event.metaKey) return;
     const steps = { ArrowUp: 0.02, ArrowRight: 0.02, ArrowDown: -0.02, ArrowLeft: -0.02, PageUp: 0.1, PageDown: -0.1 };
     if (event.key in steps) this.nudge(steps[event.key]);
     else if (event.key === 'Home') this.change(this.of.min);

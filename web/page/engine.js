@@ -64,9 +64,13 @@ export class Engine {
   /** Called in a gesture of the user: browsers let a page sound only then. Where they do not, this may wait for ever. */
   async start() {
     this.wanted = true;
-    // On a telephone, an instrument sounds even where its ringing is muted.
-    if (navigator.audioSession) navigator.audioSession.type = this.stream ? 'play-and-record' : 'playback';
+    this.askSession();
     if (this.context && !this.isRunning) await this.context.resume();
+  }
+
+  /** On a telephone, an instrument sounds even where its ringing is muted. There a page must say that it records before it may. */
+  askSession() {
+    if (navigator.audioSession) navigator.audioSession.type = this.hears ? 'play-and-record' : 'playback';
   }
 
   /** Switches the sound off until the next `start`. */
@@ -98,8 +102,10 @@ export class Engine {
   async openMicrophone() {
     await this.prepared;
     const raw = { echoCancellation: false, noiseSuppression: false, autoGainControl: false, channelCount: 1 };
-    this.stream = await navigator.mediaDevices.getUserMedia({ audio: raw });
+    this.hears = true;
+    this.askSession();
     try {
+      this.stream = await navigator.mediaDevices.getUserMedia({ audio: raw });
       this.input = new MediaStreamAudioSourceNode(this.context, { mediaStream: this.stream });
       this.input.connect(this.node);
     } catch (error) {
@@ -115,6 +121,7 @@ export class Engine {
     this.send({ microphone: false });
     this.input?.disconnect();
     this.stream?.getTracks().forEach((track) => track.stop());
-    [this.input, this.stream] = [null, null];
+    [this.input, this.stream, this.hears] = [null, null, false];
+    this.askSession();
   }
 }

@@ -329,7 +329,8 @@ export class Holes {
     link.href = URL.createObjectURL(new Blob([this.file], { type: 'application/toml' }));
     link.download = `${this.built.id ?? 'instrument'}_holes_moved.toml`;
     link.click();
-    URL.revokeObjectURL(link.href);
+    // Some browsers read it later.
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
   }
 
   drop(event) {

@@ -1,6 +1,7 @@
 // What a visit leaves for the next one, in the browser's own store. What is broken or of another version counts for nothing.
 
-const NAME = 'chalumeau';
+/** Another copy of the page, in another folder, has a store of its own. */
+const NAME = `chalumeau${new URL('.', location.href).pathname.replace(/\/$/, '')}`;
 
 const within = (value, least, most) => typeof value === 'number' && value >= least && value <= most;
 
@@ -41,7 +42,6 @@ export const Kept = {
     const fits = (hole) => holes.some(({ name }) => name === hole?.name) && within(hole.x_m, data.holes.least_x, length) && within(hole.radius_m, ...data.holes.radius);
     return {
       preset: place(data.presets, ({ name }) => name === state.preset),
-      isChanged: state.isChanged === true,
       instrument,
       controls: data.controls.map((control) => [control, state.controls?.[control.id]]).filter(([{ min, max }, value]) => within(value, min, max)),
       moved: (Array.isArray(state.moved) ? state.moved : []).filter(fits).map(({ name, x_m, radius_m }) => ({ name, x_m, radius_m })),

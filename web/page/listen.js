@@ -54,6 +54,8 @@ async function toggle(stop, button, picture) {
   if (silent) return;
   // In the gesture: a browser lets a page sound only then.
   context ??= new AudioContext({ sampleRate: tour.rate });
+  // On a telephone, it sounds even where its ringing is muted.
+  if (navigator.audioSession) navigator.audioSession.type = 'playback';
   context.resume();
   const same = playing?.stop === stop || button.classList.contains('making');
   const click = (clicks += 1);
@@ -136,6 +138,8 @@ async function made({ samples, messages }) {
 /** Draws the sound, and how much of it has been heard. */
 function follow(own, canvas) {
   const ratio = devicePixelRatio || 1;
+  // On a telephone, one that was never drawn is hidden and has no size.
+  canvas.width = 1;
   [canvas.width, canvas.height] = [ratio * canvas.clientWidth, ratio * canvas.clientHeight];
   const g = canvas.getContext('2d');
   const samples = own.stop.sound.getChannelData(0);

@@ -55,13 +55,13 @@ const drawing = new ClarinetDrawing(get('clarinet'));
 const meter = new Meter(data.dynamics, data.struck);
 const engine = new Engine(hear);
 const hands = new Hands((message) => engine.send(message));
-const keyboard = new Keyboard(get('keyboard'), hands, breathe, ([below, above]) => {
+const keyboard = new Keyboard(get('keyboard'), hands, (breath) => breathe(breath, 'piano'), ([below, above]) => {
   [get('lower').disabled, get('higher').disabled] = [!below, !above];
 });
-const drag = new Drag(get('clarinet'), hands, breathe, (touches) => {
+const drag = new Drag(get('clarinet'), hands, (breath) => breathe(breath, 'clarinet'), (touches) => {
   drawing.touch(touches.map(({ x, y, note }) => ({ x, y, name: noteName(note + instrument.transposition) })));
 });
-const typing = new Typing(hands, (breath) => breathe(breath, 'arrow keys'), (said) => {
+const typing = new Typing(hands, (breath) => breathe(breath, 'letters'), (said) => {
   if (said.letters) keyboard.setLetters(said.letters);
   if (said.help) tellKeys(said.help);
   if (said.outside !== undefined) {
@@ -94,10 +94,10 @@ const knob = new KnobPanel(engine, workshop, () => ({ ...holes.question(), value
 });
 values = [...data.defaults];
 let instrument = data.instruments[0];
-/** What holds the breath, where no device and no key does. */
-let touchedBy = '';
+/** The breath of each part of the page that blows, the latest last, where no device and no key does. */
+const breaths = new Map();
 let [blowing, isOpening] = [false, false];
-let [isChanged, isRestoring] = [false, false];
+let isRestoring = false;
 
 data.instruments.forEach(({ name }, at) => get('instrument').append(new Option(name, at)));
 get('instrument').onchange = (event) => {
@@ -151,10 +151,14 @@ function hide() {
 
 /** A control, the instrument or a hole has changed: it may no longer be the preset's, or be so again. */
 function change() {
-  isChanged = isOther();
-  if (isChanged) presets.change();
-  else presets.show();
+  tellPreset();
   keep();
+}
+
+/** Whether the page is the preset's. */
+function tellPreset() {
+  if (isOther()) presets.change();
+  else presets.show();
 }
 
 /** Whether the page has something else than the preset. */
@@ -170,10 +174,12 @@ function keep() {
   if (isRestoring) return;
   Kept.write({
     preset: presets.all[presets.at].name,
-    isChanged,
-    instrument: instrument.own ? undefined : instrument.id,
-    controls: Object.fromEntries(data.controls.map(({ id, place }) => [id, values[place]])),
-    moved: instrument.own ? [] : holes.moved,
+    // What a preset says is its own: another version may say something else.
+    ...(isOther() && {
+      instrument: instrument.own ? undefined : instrument.id,
+      controls: Object.fromEntries(data.controls.map(({ id, place }) => [id, values[place]])),
+      moved: instrument.own ? [] : holes.moved,
+    }),
     volume: Number(get('volume').value),
   });
 }
@@ -191,8 +197,7 @@ function restore() {
   });
   if (kept.moved.length > 0) holes.put(kept.moved);
   isRestoring = false;
-  isChanged = kept.isChanged;
-  if (isChanged) presets.change();
+  tellPreset();
 }
 
 function begin() {
@@ -239,11 +244,13 @@ function usual() {
   return hasPlayed || holes.isOpen ? '' : IDLE;
 }
 
-/** Breath of hands on the screen or of arrow keys; null when they let go. The microphone's breath stays what it is. */
-function breathe(breath, by = 'mouse or finger') {
-  if (blowing || (breath === null && touchedBy === '')) return;
-  touchedBy = breath === null ? '' : by;
-  engine.send({ breath });
+/** Breath of hands on the screen or of arrow keys; null when they let go: then another part that still blows does. The microphone's
+ * breath stays what it is. */
+function breathe(breath, part) {
+  const blew = breaths.delete(part);
+  if (breath !== null) breaths.set(part, breath);
+  if (blowing || (breath === null && !blew)) return;
+  engine.send({ breath: [...breaths.values()].at(-1) ?? null });
   midi.isTaken = true;
 }
 
@@ -320,7 +327,6 @@ function choose(preset) {
   meter.setPhysical(values[data.breathResponse] === 1);
   knob.update();
   presets.show();
-  isChanged = false;
   keep();
 }
 
@@ -384,7 +390,7 @@ function announce(text) {
 /** Where the breath comes from. */
 function breathing() {
   if (room) return room.calibrating ? 'Microphone' : 'Breath: microphone';
-  if (touchedBy) return `Breath: ${touchedBy}`;
+  if (breaths.size > 0) return `Breath: ${[...breaths.keys()].at(-1) === 'letters' ? 'arrow keys' : 'mouse or finger'}`;
   return origin && !(midi.isTaken && BLOWING.includes(origin)) ? `Breath: ${origin}` : 'Breath: keys';
 }
 

@@ -1,14 +1,19 @@
 // Keeps the page, so that it opens without a network. `cargo xtask web` fills in version and files.
 
-const NAME = 'chalumeau-VERSION';
+/** Another copy of the page, in another folder, has a store of its own. */
+const OWN = `chalumeau${new URL('.', location.href).pathname.replace(/\/$/, '')}-`;
+const NAME = `${OWN}VERSION`;
 const FILES = [/* FILES */];
 const LATER = 'workshop.wasm';
 /** Whether that is an address of it, in whatever version. */
 const isLater = (address) => /\/workshop(-[0-9a-f]+)?\.wasm$/.test(new URL(address).pathname);
 
+/** Whether a store is of this copy, in whatever version. */
+const isOwn = (name) => name.startsWith(OWN) && /^[0-9a-f]+$/.test(name.slice(OWN.length));
+
 /** Whether it has been kept before. */
 async function hadLater() {
-  const own = (await caches.keys()).filter((name) => name.startsWith('chalumeau-'));
+  const own = (await caches.keys()).filter(isOwn);
   const kept = await Promise.all(own.map(async (name) => (await caches.open(name)).keys()));
   return kept.flat().some(({ url }) => isLater(url));
 }
@@ -19,16 +24,26 @@ addEventListener('install', (event) => {
   const keep = async () => {
     // Who has had the large file once can go on without a network after an update, too.
     if (await hadLater()) all.push(new Request(LATER, { cache: 'reload' }));
-    await (await caches.open(NAME)).addAll(all);
+    // All of them, or none.
+    const answers = await Promise.all(all.map(whole));
+    const cache = await caches.open(NAME);
+    await Promise.all(all.map((request, at) => cache.put(request, answers[at])));
   };
   event.waitUntil(keep());
 });
+
+/** A file as it is kept. A server may redirect (`listen.html` to `listen`), and browsers refuse to open a page that was. */
+async function whole(request) {
+  const answer = await fetch(request);
+  if (!answer.ok) throw new Error(`${request.url}: ${answer.status}`);
+  return answer.redirected ? new Response(await answer.blob(), { headers: answer.headers }) : answer;
+}
 
 // The user wants the new version now.
 addEventListener('message', ({ data }) => data === 'now' && skipWaiting());
 
 addEventListener('activate', (event) => {
-  const old = (name) => name.startsWith('chalumeau-') && name !== NAME;
+  const old = (name) => isOwn(name) && name !== NAME;
   event.waitUntil(
     caches.keys().then((names) => Promise.all(names.filter(old).map((name) => caches.delete(name)))).then(() => clients.claim()),
   );

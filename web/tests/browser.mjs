@@ -470,7 +470,7 @@ const TESTS = {
     assert.equal(await page.inputValue('#hole-place'), place);
     const old = ['{', 'null', '[]', '7', '{"preset":3,"instrument":"none","moved":[{"name":"L1"}],"controls":{"lip":"x"},"volume":1e9}'];
     for (const broken of old) {
-      await page.evaluate((broken) => localStorage.setItem('chalumeau', broken), broken);
+      await page.evaluate((broken) => localStorage.setItem(Object.keys(localStorage)[0], broken), broken);
       await again();
       assert.equal(await page.textContent('#preset'), 'B flat clarinet');
       assert.equal(await page.inputValue('#volume'), '80');
@@ -536,6 +536,17 @@ const TESTS = {
     return `first sound after ${took} ms`;
   },
 
+  async 'on a telephone the listening page draws the first sound, too'(browser) {
+    const { page, context, errors } = await open(browser, `${server.address}listen.html`, { other: true, serviceWorkers: 'block', viewport: { width: 390, height: 844 } });
+    await page.waitForFunction(() => globalThis.listen);
+    await page.locator('.stop-card').first().click();
+    await page.waitForFunction(() => globalThis.listen.playing());
+    const [width, height] = await page.locator('.stop-card canvas').first().evaluate((canvas) => [canvas.width, canvas.height]);
+    assert.ok(width > 200 && height > 20, `${width} x ${height}`);
+    assert.deepEqual(errors, []);
+    await context.close();
+  },
+
   async 'controls work without a mouse'(browser) {
     const { page, context, errors } = await open(browser, server.address, { serviceWorkers: 'block' });
     const unnamed = await page.$$eval('button, select, input, [tabindex]', (all) =>
@@ -544,6 +555,10 @@ const TESTS = {
     assert.deepEqual(unnamed, []);
     const growl = page.locator('#control-growl');
     await growl.focus();
+    // The browser's own.
+    await page.keyboard.press('Alt+ArrowUp');
+    await page.keyboard.press('Control+Home');
+    assert.equal(Number(await growl.getAttribute('aria-valuenow')), 0);
     await page.keyboard.press('End');
     assert.equal(Number(await growl.getAttribute('aria-valuenow')), 1);
     assert.equal(await growl.getAttribute('aria-valuetext'), '100 %');
@@ -560,7 +575,7 @@ const TESTS = {
   async 'the page opens without a network'(browser) {
     const { page, context, errors } = await open(browser, server.address);
     await page.evaluate(() => navigator.serviceWorker.ready);
-    await page.waitForFunction(async () => (await caches.keys()).some((name) => name.startsWith('chalumeau-')) && navigator.serviceWorker.controller);
+    await page.waitForFunction(async () => (await caches.keys()).some((name) => name.startsWith('chalumeau')) && navigator.serviceWorker.controller);
     // What is still on its way would fail, which the browser notes as an error.
     await page.waitForLoadState('networkidle');
     await context.setOffline(true);

@@ -14,7 +14,8 @@ export const [HEARD, SILENT] = [0.01, 0.0005];
 
 /**
  * Serves a folder below a path, as a page on a host of others is; returns the address. `instead` has texts that are served in place
- * of files, by their names, null for files that are lost, or a function that gives one of these or, after a time, nothing.
+ * of files, by their names, null for files that are lost, `{ to }` for a name that is redirected to another, or a function that gives
+ * one of these or, after a time, nothing.
  */
 export async function serve(folder) {
   const instead = new Map();
@@ -22,7 +23,8 @@ export async function serve(folder) {
     const path = join(folder, normalize(decodeURIComponent(new URL(url, 'http://x').pathname)).replace(/^\/below\/a\/path/, ''));
     const name = basename(path);
     const text = await (typeof instead.get(name) === 'function' ? instead.get(name)() : instead.get(name));
-    if (text !== undefined) return answer.writeHead(text === null ? 404 : 200, { 'Content-Type': KINDS[extname(path)] ?? 'text/plain' }).end(text ?? '');
+    if (text?.to) return answer.writeHead(301, { Location: text.to }).end();
+    if (text !== undefined) return answer.writeHead(text === null ? 404 : 200, { 'Content-Type': KINDS[extname(path) || '.html'] ?? 'text/plain' }).end(text ?? '');
     const file = existsSync(path) && statSync(path).isDirectory() ? join(path, 'index.html') : path;
     if (!existsSync(file)) return answer.writeHead(404).end();
     answer.writeHead(200, { 'Content-Type': KINDS[extname(file)] ?? 'application/octet-stream' });

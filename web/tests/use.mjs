@@ -1,6 +1,8 @@
 // What users do to the page, and what happens to it, in Chromium: node use.mjs PAGE FOLDER.
 
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { workshopOf } from './module.mjs';
 import { DYNAMIC, HEARD, KEY, LEVEL, PLAIN_HOST, SOUNDING, latest, launch, open, running, serve, silence, until } from './page.mjs';
 
@@ -145,6 +147,69 @@ const SILENCE = {
     assert.equal(await page.getAttribute('#microphone', 'aria-pressed'), 'false');
     assert.deepEqual(errors.filter((error) => !isLoss(error)), []);
     await context.close();
+  },
+
+  async 'on a telephone the page says that it records before it asks for the microphone'(browser) {
+    const before = () => {
+      const session = { type: 'auto' };
+      Object.defineProperty(navigator, 'audioSession', { value: session });
+      globalThis.asked = [];
+      // As WebKit does; then there is none.
+      navigator.mediaDevices.getUserMedia = async () => {
+        globalThis.asked.push(session.type);
+        throw session.type === 'playback' ? new DOMException('AudioSession category is not compatible with audio capture.', 'InvalidStateError') : new DOMException('', 'NotFoundError');
+      };
+    };
+    const opened = await open(browser, server.address, { before, ...PLAIN });
+    const { page } = opened;
+    await page.click('#microphone');
+    await says(page, /^No microphone was found/);
+    assert.deepEqual(await page.evaluate(() => [globalThis.asked, navigator.audioSession.type]), [['play-and-record'], 'playback']);
+    await end(opened);
+  },
+
+  async 'who still blows goes on when another hand lets go'(browser) {
+    const opened = await open(browser, server.address, PLAIN);
+    const { page } = opened;
+    await page.evaluate(() => {
+      const { engine } = globalThis.chalumeau;
+      const send = engine.send.bind(engine);
+      globalThis.breaths = [];
+      engine.send = (message) => {
+        if ('breath' in message) globalThis.breaths.push(message.breath);
+        send(message);
+      };
+    });
+    const blown = () => page.evaluate(() => globalThis.breaths.at(-1));
+    const box = await page.locator('#clarinet').boundingBox();
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
+    await page.mouse.down();
+    const own = await blown();
+    assert.ok(own > 0.2 && own < 0.8, `${own}`);
+    await page.keyboard.down('d');
+    await page.keyboard.press('ArrowUp');
+    assert.notEqual(await blown(), own);
+    await page.keyboard.up('d');
+    assert.equal(await blown(), own);
+    await page.mouse.up();
+    assert.equal(await blown(), null);
+    await end(opened);
+  },
+
+  async 'a preset that nobody has changed is kept by its name alone'(browser) {
+    const opened = await open(browser, server.address, PLAIN);
+    const { page } = opened;
+    const kept = () => page.evaluate(() => {
+      const [key] = Object.keys(localStorage);
+      return JSON.parse(localStorage.getItem(key));
+    });
+    const growl = page.locator('#control-growl');
+    await growl.focus();
+    await page.keyboard.press('End');
+    assert.equal((await kept()).controls.growl, 1);
+    await page.keyboard.press('Delete');
+    assert.deepEqual(Object.keys(await kept()).sort(), ['preset', 'volume']);
+    await end(opened);
   },
 
   async 'a failure that has passed is not said any more'(browser) {
@@ -519,9 +584,10 @@ const HOLES = {
     assert.ok(Math.abs((await moved(page)).F_PAD[1] - 0.15e-3) < 1e-9);
     // One hole that is damaged in what was kept takes no other along.
     await page.evaluate(() => {
-      const kept = JSON.parse(localStorage.getItem('chalumeau'));
+      const [name] = Object.keys(localStorage);
+      const kept = JSON.parse(localStorage.getItem(name));
       kept.moved.push({ name: 'EB_KEY', x_m: 0.4, radius_m: 0.5 });
-      localStorage.setItem('chalumeau', JSON.stringify(kept));
+      localStorage.setItem(name, JSON.stringify(kept));
     });
     await page.reload();
     await page.waitForFunction(() => globalThis.chalumeau?.engine.node);
@@ -878,12 +944,12 @@ const VERSIONS = {
   async 'a new version is offered, and comes with a click'(browser) {
     const opened = await open(browser, server.address);
     const { page } = opened;
-    await page.waitForFunction(async () => navigator.serviceWorker.controller && (await caches.keys()).some((name) => name.startsWith('chalumeau-')));
+    await page.waitForFunction(async () => navigator.serviceWorker.controller && (await caches.keys()).some((name) => name.startsWith('chalumeau')));
     await page.waitForLoadState('networkidle');
     assert.equal(await page.isVisible('#update'), false);
     const text = await page.evaluate(async () => (await fetch('sw.js', { cache: 'reload' })).text());
     const other = await page.evaluate(async () => (await (await fetch('names.js')).text()));
-    server.instead.set('sw.js', text.replace(/chalumeau-[0-9a-f]{16}/, 'chalumeau-fedcba9876543210'));
+    server.instead.set('sw.js', text.replace(/(?<=OWN\})[0-9a-f]{16}/, 'fedcba9876543210'));
     server.instead.set('names.js', `${other}\nglobalThis.isNew = true;\n`);
     await page.evaluate(async () => (await navigator.serviceWorker.getRegistration()).update());
     await page.waitForFunction(() => !document.getElementById('update').hidden);
@@ -891,7 +957,34 @@ const VERSIONS = {
     assert.equal(await page.evaluate(() => globalThis.isNew), undefined);
     await Promise.all([page.waitForEvent('load'), page.click('#update')]);
     await page.waitForFunction(() => globalThis.isNew && globalThis.chalumeau?.engine.node);
-    assert.deepEqual(await page.evaluate(async () => (await caches.keys())), ['chalumeau-fedcba9876543210']);
+    assert.deepEqual(await page.evaluate(async () => (await caches.keys())), ['chalumeau/below/a/path-fedcba9876543210']);
+    await end(opened);
+  },
+
+  async 'a server that takes the ends off names serves every page again from the browser'(browser) {
+    const text = readFileSync(join(folder, 'listen.html'), 'utf8');
+    server.instead.set('listen.html', { to: 'listen' });
+    server.instead.set('listen', text);
+    const opened = await open(browser, server.address);
+    const { page } = opened;
+    await page.waitForFunction(() => navigator.serviceWorker.controller);
+    await page.goto(`${server.address}listen.html`);
+    await page.waitForFunction(() => globalThis.listen);
+    await end(opened);
+  },
+
+  async 'a copy in another folder keeps its own store'(browser) {
+    const opened = await open(browser, server.address);
+    const { page } = opened;
+    await page.waitForFunction(() => navigator.serviceWorker.controller);
+    await page.evaluate(() => caches.open('chalumeau/another/path-0123456789abcdef'));
+    const sw = await page.evaluate(async () => (await fetch('sw.js', { cache: 'reload' })).text());
+    server.instead.set('sw.js', sw.replace(/(?<=OWN\})[0-9a-f]{16}/, 'fedcba9876543210'));
+    await page.evaluate(async () => (await navigator.serviceWorker.getRegistration()).update());
+    await page.waitForFunction(() => !document.getElementById('update').hidden);
+    await Promise.all([page.waitForEvent('load'), page.click('#update')]);
+    const names = await page.evaluate(async () => (await caches.keys()).sort());
+    assert.deepEqual(names, ['chalumeau/another/path-0123456789abcdef', 'chalumeau/below/a/path-fedcba9876543210']);
     await end(opened);
   },
 };

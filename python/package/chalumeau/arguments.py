@@ -21,7 +21,7 @@ InstrumentLike = Union[str, "os.PathLike[str]", Mapping[str, Any], Instrument]
 #: A MIDI number, 0 to 127, or a name such as ``"C4"``.
 NoteLike = Union[SupportsIndex, SupportsFloat, str]
 #: A value of a setting: a number, a switch, or a text with a unit, such as ``"7 kPa"``.
-Value = Union[SupportsIndex, SupportsFloat, str, None]
+Value = Union[SupportsIndex, SupportsFloat, str, "os.PathLike[str]", None]
 
 
 def instruments() -> list[str]:
@@ -218,8 +218,11 @@ _WHOLE = ("written", "sounding", "rate", "players")
 def text_of(name: str, value: Value) -> str:
     """A value as the command line would have it."""
     if name.replace("-", "_") == "open_holes" and isinstance(value, (list, tuple)):
-        return " ".join(value)
+        # An empty text leaves the argument out; without a hole, all are shut.
+        return " ".join(value) or " "
     value = plain(name, value)
+    if isinstance(value, os.PathLike):
+        return os.fsdecode(value)
     if isinstance(value, str):
         return _spelt(value) if name in ("written", "sounding") else value
     if value is None:

@@ -294,7 +294,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             alone = measured[0][1]
             for count, rows_per_s in measured:
                 print(f"{count} processes: {rows_per_s:.1f} rows a second, {rows_per_s / alone:.2f} times one process")
-    except (ValueError, RuntimeError, OSError) as error:
+    except (ValueError, RuntimeError, OSError, ImportError) as error:
         parser.exit(2, f"error: {error}\n")
 
 
