@@ -3,8 +3,8 @@
 /// The sustain pedal.
 const SUSTAIN: u8 = 64;
 
-/// Keys and pedals that are down. Real-time safe.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Keys and pedals that are down.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct HeldKeys {
     /// The keys of each channel, a bit each.
     keys: [u128; 16],
@@ -26,38 +26,19 @@ impl HeldKeys {
         }
     }
 
-    /// What is not down at another port, too.
-    #[must_use]
-    pub fn without(mut self, other: &Self) -> Self {
-        self.keys.iter_mut().zip(other.keys).for_each(|(keys, others)| *keys &= !others);
-        self.pedals &= !other.pedals;
-        self
-    }
-
-    /// The messages that let all of it go, the pedals first.
-    pub fn endings(self) -> Endings {
-        Endings(self)
-    }
-}
-
-/// See [`HeldKeys::endings`]. Real-time safe.
-#[derive(Debug)]
-pub struct Endings(HeldKeys);
-
-impl Iterator for Endings {
-    type Item = [u8; 3];
-
-    fn next(&mut self) -> Option<[u8; 3]> {
-        let Self(HeldKeys { keys, pedals }) = self;
-        if *pedals != 0 {
-            let channel = pedals.trailing_zeros();
-            *pedals &= *pedals - 1;
-            return Some([0xB0 | channel as u8, SUSTAIN, 0]);
+    /// The messages that let all of it go, but a pedal that is down at one of the others, too. A key that is down there stays down:
+    /// the instrument counts how often each was struck.
+    pub fn endings(&self, others: &[Self]) -> Vec<[u8; 3]> {
+        let elsewhere = others.iter().fold(0, |pedals, other| pedals | other.pedals);
+        let mut all = Vec::new();
+        for channel in 0..16_u8 {
+            if (self.pedals & !elsewhere) >> channel & 1 == 1 {
+                all.push([0xB0 | channel, SUSTAIN, 0]);
+            }
+            let keys = self.keys[usize::from(channel)];
+            all.extend((0..128_u8).filter(|key| keys >> key & 1 == 1).map(|key| [0x80 | channel, key, 0]));
         }
-        let channel = keys.iter().position(|&keys| keys != 0)?;
-        let key = keys[channel].trailing_zeros();
-        keys[channel] &= keys[channel] - 1;
-        Some([0x80 | channel as u8, key as u8, 0])
+        all
     }
 }
 
@@ -70,10 +51,6 @@ mod tests {
         let mut held = HeldKeys::default();
         messages.iter().for_each(|bytes| held.hear(bytes));
         held
-    }
-
-    fn endings(held: HeldKeys) -> Vec<[u8; 3]> {
-        held.endings().collect()
     }
 
     #[test]
@@ -89,19 +66,11 @@ mod tests {
             [0xB5, SUSTAIN, 63],
             [0xB0, 1, 127],
         ]);
-        assert_eq!(endings(gone), [[0xB0, SUSTAIN, 0], [0x80, 60, 0], [0x80, 67, 0], [0x85, 64, 0]]);
-        // Another keyboard holds one of the keys, and the pedal; a third has the key of another channel.
+        let keys = [[0x80, 60, 0], [0x80, 67, 0], [0x85, 64, 0]];
+        assert_eq!(gone.endings(&[]), [&[[0xB0, SUSTAIN, 0]], keys.as_slice()].concat());
+        // Another keyboard holds the pedal, and one of the keys, which was struck twice then.
         let others = [after(&[[0x90, 60, 1], [0xB0, SUSTAIN, 127]]), after(&[[0x94, 64, 1]])];
-        let rest = others.iter().fold(gone, HeldKeys::without);
-        assert_eq!(endings(rest), [[0x80, 67, 0], [0x85, 64, 0]]);
-        assert!(endings(HeldKeys::default().without(&others[0])).is_empty());
-        // What has been let go is down no more.
-        assert_eq!(
-            endings(gone).iter().fold(gone, |mut held, bytes| {
-                held.hear(bytes);
-                held
-            }),
-            HeldKeys::default()
-        );
+        assert_eq!(gone.endings(&others), keys);
+        assert!(HeldKeys::default().endings(&others).is_empty());
     }
 }

@@ -132,8 +132,8 @@ impl State {
             say(&format!("MIDI input gone: {name}"));
             // Whoever played these notes cannot release them any more. Those of other keyboards go on.
             let down = |held: &Held| *held.lock().unwrap_or_else(PoisonError::into_inner);
-            let own = self.open.iter().fold(down(&held), |own, other| own.without(&down(&other.held)));
-            for message in own.endings() {
+            let others: Vec<HeldKeys> = self.open.iter().map(|other| down(&other.held)).collect();
+            for message in down(&held).endings(&others) {
                 push(&self.queue, &message);
             }
             if self.open.is_empty() {

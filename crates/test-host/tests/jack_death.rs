@@ -139,6 +139,8 @@ struct Heard {
     crossings_hz: AtomicU32,
     /// The listener is to blow.
     blows: AtomicBool,
+    /// It lets its key go no more.
+    holds: AtomicBool,
 }
 
 impl Heard {
@@ -165,7 +167,9 @@ impl jack::ProcessHandler for Ear {
         let mut keys = self.keys.writer(scope);
         // Again and again, because nobody may be connected yet.
         let pressed = self.cycles % 100;
+        let holds = self.heard.holds.load(Ordering::Relaxed);
         if let Some(bytes) = [(0, [0x90, 60, 100]), (90, [0x80, 60, 0])].iter().find(|(at, _)| *at == pressed)
+            && (!holds || bytes.0 == 0)
         {
             let _ = keys.write(&RawMidi { time: 0, bytes: &bytes.1 });
         }
@@ -264,6 +268,30 @@ fn it_plays_again_after_each_death_of_the_server() {
     }
     program.ends_soon();
     drop(listener);
+}
+
+#[test]
+#[ignore = "kills JACK servers"]
+fn the_keys_of_a_device_that_goes_come_up() {
+    let _turn = turn();
+    let running = server(48_000);
+    let mut program = Program::start(&running, &[]);
+    let listener = Listener::join();
+    listener.heard.holds.store(true, Ordering::Relaxed);
+    listener.connect();
+    listener.hears(Instant::now() + PATIENCE);
+    // The program notes its connections each second. The key is struck again meanwhile, without coming up.
+    std::thread::sleep(Duration::from_millis(3_200));
+    listener.hears(Instant::now());
+    let client = listener.client.as_client();
+    client.disconnect_ports_by_name("listener:keys", "chalumeau:midi_input").unwrap();
+    let until = Instant::now() + PATIENCE;
+    while listener.heard.peak() >= AUDIBLE {
+        assert!(Instant::now() < until, "it sounds on: {:#?}", program.said);
+        std::thread::sleep(Duration::from_millis(25));
+    }
+    program.ends_soon();
+    drop((listener, running));
 }
 
 #[test]

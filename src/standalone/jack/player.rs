@@ -13,13 +13,15 @@ use nice_plug::prelude::*;
 
 use crate::plugin::Chalumeau;
 use crate::standalone::devices;
-use crate::standalone::held_keys::{Endings, HeldKeys};
 use chalumeau_knob::touch::breath_from_angle::GRID;
 
 /// Longest cycle of a JACK server, samples.
 pub const LONGEST_CYCLE: u32 = 8_192;
 /// Events that one cycle can send: the breath of a knob, two for each value, in the longest cycle.
 const SENT_MOST: usize = 2 * LONGEST_CYCLE as usize / GRID as usize;
+
+/// The sustain pedal comes up, and all notes end. JACK does not say whose they are, so those of another device end, too.
+const LET_GO: [[u8; 3]; 2] = [[0xB0, 64, 0], [0xB0, 123, 0]];
 
 /// What the JACK thread tells the link thread.
 #[derive(Debug, Default)]
@@ -49,8 +51,6 @@ pub struct JackPlayer {
     ports: JackPlayerPorts,
     sent: Vec<NoteEvent<()>>,
     transport: Transport,
-    /// What is down at the MIDI input, whoever holds it.
-    held: HeldKeys,
 }
 
 impl JackPlayer {
@@ -61,24 +61,17 @@ impl JackPlayer {
         ports: JackPlayerPorts,
         rate_hz: f32,
     ) -> Self {
-        let (sent, transport) = (Vec::with_capacity(SENT_MOST), Transport::new(rate_hz));
-        Self { plugin, signs, ports, sent, transport, held: HeldKeys::default() }
+        Self { plugin, signs, ports, sent: Vec::with_capacity(SENT_MOST), transport: Transport::new(rate_hz) }
     }
 
     fn play(&mut self, scope: &ProcessScope) {
         let JackPlayerPorts { outputs, microphone, midi_input, midi_output } = &mut self.ports;
         let mut channels = outputs.each_mut().map(|port| port.as_mut_slice(scope));
         self.sent.clear();
-        // JACK does not say whose keys are down. Those of another device end, too.
-        let let_go = if self.signs.lets_go.swap(false, Ordering::Relaxed) {
-            std::mem::take(&mut self.held)
-        } else {
-            HeldKeys::default()
-        };
+        let lets_go = self.signs.lets_go.swap(false, Ordering::Relaxed);
         let mut context = CycleContext {
-            endings: let_go.endings(),
+            endings: if lets_go { &LET_GO } else { &[] },
             incoming: midi_input.iter(scope),
-            held: &mut self.held,
             frames: scope.n_frames(),
             sent: &mut self.sent,
             transport: &self.transport,
@@ -133,10 +126,9 @@ impl jack::NotificationHandler for JackNotices {
 
 /// One cycle, as the plugin sees it.
 struct CycleContext<'a> {
-    /// What ends the notes of a device that has gone.
-    endings: Endings,
+    /// What comes before: it ends the notes of a device that has gone.
+    endings: &'static [[u8; 3]],
     incoming: MidiIter<'a>,
-    held: &'a mut HeldKeys,
     frames: u32,
     sent: &'a mut Vec<NoteEvent<()>>,
     transport: &'a Transport,
@@ -157,16 +149,12 @@ impl ProcessContext<Chalumeau> for CycleContext<'_> {
     }
 
     fn next_event(&mut self) -> Option<NoteEvent<()>> {
-        if let Some(event) = self.endings.find_map(|bytes| NoteEvent::from_midi(0, &bytes).ok()) {
-            return Some(event);
-        }
         let last = self.frames.saturating_sub(1);
-        let Self { incoming, held, .. } = self;
+        if let Some(bytes) = self.endings.split_off_first() {
+            return NoteEvent::from_midi(0, bytes).ok();
+        }
         // What is no note event is skipped.
-        incoming.find_map(|midi| {
-            held.hear(midi.bytes);
-            NoteEvent::from_midi(midi.time.min(last), midi.bytes).ok()
-        })
+        self.incoming.find_map(|midi| NoteEvent::from_midi(midi.time.min(last), midi.bytes).ok())
     }
 
     fn try_send_event(&mut self, event: NoteEvent<()>) -> Result<(), (NoteEvent<()>, SendEventError)> {
