@@ -5,7 +5,7 @@
 
 use std::fs;
 use std::io;
-use std::io::{BufWriter, Read, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, BufWriter, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -177,16 +177,18 @@ impl NewFile {
         }
     }
 
-    /// Gives a file of lines its name, even if not all of it could be written: then it ends with its last whole line. If another
-    /// file has the name by now, its name gets a number.
-    pub fn keep_lines(self) -> Result<KeptLines, OutputError> {
+    /// Gives a file of lines its name, even if not all of it could be written: it ends with its last whole line. If another file
+    /// has the name by now, its name gets a number. A file with no more than `head` lines is not kept.
+    pub fn keep_lines(self, head: usize) -> Result<KeptLines, OutputError> {
         let Self { path, mut temp, _listed, .. } = self;
         let cut = io::Write::flush(&mut temp).err().map(plain);
         // What is still in the buffer finds no room.
         let (mut temp, _) = temp.into_parts();
         let refused = |source| OutputError::Write { path: path.clone(), source: plain(source) };
-        if cut.is_some() {
-            end_with_a_line(temp.as_file_mut()).map_err(refused)?;
+        // A line may have begun before there was no room.
+        end_with_a_line(temp.as_file_mut()).map_err(refused)?;
+        if !has_more_lines(temp.as_file_mut(), head).map_err(refused)? {
+            return Err(refused(cut.unwrap_or_else(|| io::ErrorKind::WriteZero.into())));
         }
         loop {
             let path = free_path(&path);
@@ -241,6 +243,13 @@ fn end_with_a_line(file: &mut fs::File) -> io::Result<()> {
         end = begin;
     }
     file.set_len(0)
+}
+
+/// Whether a file has more than so many lines.
+fn has_more_lines(file: &mut fs::File, lines: usize) -> io::Result<bool> {
+    file.seek(SeekFrom::Start(0))?;
+    let more = BufReader::new(file).split(b'\n').nth(lines).transpose()?;
+    Ok(more.is_some())
 }
 
 /// Writes a small file of the program's own, in place of what was there. Its folder is made.
@@ -322,7 +331,7 @@ mod tests {
         let files = [(); 3].map(|()| NewFile::create(&free_path(&path), false).unwrap());
         for (mut file, name) in files.into_iter().zip(["x.csv", "x-1.csv", "x-2.csv"]) {
             writeln!(file, "one line").unwrap();
-            let kept = file.keep_lines().unwrap();
+            let kept = file.keep_lines(0).unwrap();
             assert!(kept.cut.is_none());
             assert_eq!(kept.path.file_name().unwrap(), name);
             assert_eq!(fs::read(&kept.path).unwrap(), b"one line\n");
@@ -350,12 +359,28 @@ mod tests {
         let full = fs::File::options().write(true).open("/dev/full").unwrap();
         let temp = file.temp.get_mut();
         let written = std::mem::replace(temp.as_file_mut(), full);
-        writeln!(file, "lost").unwrap();
+        write!(file, "late\nhal").unwrap();
         assert!(file.flush().is_err());
         *file.temp.get_mut().as_file_mut() = written;
-        let KeptLines { path, cut } = file.keep_lines().unwrap();
+        let KeptLines { path, cut } = file.keep_lines(1).unwrap();
         assert!(cut.is_none(), "there is room again");
-        assert_eq!(fs::read_to_string(path).unwrap(), "written\nlost\n");
+        assert_eq!(fs::read_to_string(path).unwrap(), "written\nlate\n");
+    }
+
+    #[test]
+    fn lines_end_whole_and_a_file_without_rows_is_not_kept() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x.csv");
+        for (head, kept) in [(1, vec!["x.csv"]), (2, vec![])] {
+            let mut file = NewFile::create(&path, false).unwrap();
+            write!(file, "head\nrow\nhal").unwrap();
+            assert_eq!(file.keep_lines(head).is_ok(), !kept.is_empty());
+            assert_eq!(names(directory.path()), kept);
+            if head == 1 {
+                assert_eq!(fs::read_to_string(&path).unwrap(), "head\nrow\n");
+                fs::remove_file(&path).unwrap();
+            }
+        }
     }
 
     #[test]

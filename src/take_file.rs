@@ -16,6 +16,8 @@ use crate::output::{KeptLines, NewFile, OutputError};
 /// A take that is being written. [`keep`](Self::keep) makes the complete file appear.
 pub struct TakeFile {
     writer: TakeWriter<NewFile>,
+    /// Lines above the rows: remarks, and the names of the columns.
+    head: usize,
 }
 
 impl TakeFile {
@@ -24,7 +26,7 @@ impl TakeFile {
         let path = file.path().to_owned();
         remarks.extend(time_of_day(SystemTime::now()).map(|now| format!("begun {now}")));
         match TakeWriter::new(file, &remarks) {
-            Ok(writer) => Ok(Self { writer }),
+            Ok(writer) => Ok(Self { writer, head: remarks.len() + 1 }),
             Err(source) => Err(OutputError::Write { path, source }),
         }
     }
@@ -44,9 +46,9 @@ impl TakeFile {
         self.writer.into_inner().keep()
     }
 
-    /// Gives the file a name, even if not all rows could be written.
-    pub fn keep_lines(self) -> Result<KeptLines, OutputError> {
-        self.writer.into_inner().keep_lines()
+    /// Gives the file a name, even if not all rows could be written, but only if there are any.
+    pub fn keep_rows(self) -> Result<KeptLines, OutputError> {
+        self.writer.into_inner().keep_lines(self.head)
     }
 }
 

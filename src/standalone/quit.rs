@@ -31,8 +31,8 @@ pub fn listen(options: &'static LaunchOptions) {
     }
 }
 
-/// Begins the end. A window closes, and the program ends with it; otherwise the program ends here. If it is still there after
-/// [`PATIENCE`], it is ended without the sound system. Only the first call counts.
+/// Begins the end. A window closes, and the program ends with it; otherwise the program ends here. If it is still there
+/// after [`KNOB_PATIENCE`] and [`PATIENCE`], it is ended without what it waits for. Only the first call counts.
 pub fn begin(options: &'static LaunchOptions) {
     if options.quit.swap(true, Ordering::Relaxed) {
         return;
@@ -43,12 +43,16 @@ pub fn begin(options: &'static LaunchOptions) {
             std::thread::sleep(PATIENCE);
             tell!("chalumeau-standalone: the sound system does not let go; ended without it");
         } else {
-            tell!("chalumeau-standalone: the knob or the disk does not answer; ended without them");
+            tell!(
+                "chalumeau-standalone: the knob, its take or the disk keeps it waiting; ended without them"
+            );
         }
         end(options);
         std::process::exit(0);
     });
-    // The sound system may never let the program come to the end, at which both are done, too.
+    // The sound system may never let the program come to the end, at which both are done, too. The session first: nothing holds it
+    // up but the disk. And again with the take that has ended.
+    StandalonePlugin::save();
     StandalonePlugin::leave_knob();
     StandalonePlugin::save();
     let _ = saved.send(());

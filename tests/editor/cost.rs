@@ -15,6 +15,8 @@ const FRAMES: u32 = 60;
 const ROWS: u32 = 100;
 /// Most that a frame may cost, in frames of the plain widgets. Builds for tests leave our code without optimisation, but not egui's.
 const MOST: f64 = 2.5;
+/// How often a view is measured that seems to cost more. What other programs add passes; what a view costs does not.
+const ATTEMPTS: u32 = 5;
 
 /// Time this thread has been on a processor, if the system tells; it is told every few milliseconds.
 fn on_cpu() -> Option<Duration> {
@@ -77,26 +79,28 @@ fn cost_of_a_frame() {
     let (snapshot, host) = (c4(), Fake::default());
     let mut dear = Vec::new();
     for scale in [1.0, 2.0] {
-        let unit_ms = Cost::of(scale, plain).ms();
-        println!("plain widgets {:3.0} %: {unit_ms:5.2} ms", 100.0 * scale);
         for tab in Tab::ALL {
-            let mut state = EditorState::new(WindowState { tab, ..WindowState::default() });
-            let cost = Cost::of(scale, |ui| {
-                draw(ui, &mut state, &host, &snapshot);
-            });
-            let Cost { median_ms, on_cpu_ms, meshes } = cost;
-            let ratio = cost.ms() / unit_ms;
-            println!(
-                "{:<11} {:3.0} %: median {median_ms:5.2} ms, on the processor {on_cpu_ms:5.2} ms, {ratio:.2} of plain widgets, {meshes} \
-                 meshes",
-                tab.name(),
-                100.0 * scale
-            );
-            assert!(meshes > 0);
-            if ratio > MOST {
-                dear.push((tab.name(), scale, ratio));
+            let measured = || {
+                let unit_ms = Cost::of(scale, plain).ms();
+                let mut state = EditorState::new(WindowState { tab, ..WindowState::default() });
+                let cost = Cost::of(scale, |ui| {
+                    draw(ui, &mut state, &host, &snapshot);
+                });
+                let Cost { median_ms, on_cpu_ms, meshes } = cost;
+                let ratio = cost.ms() / unit_ms;
+                println!(
+                    "{:<11} {:3.0} %: median {median_ms:5.2} ms, on the processor {on_cpu_ms:5.2} ms, {ratio:.2} of plain widgets \
+                     ({unit_ms:.2} ms), {meshes} meshes",
+                    tab.name(),
+                    100.0 * scale
+                );
+                assert!(meshes > 0);
+                ratio
+            };
+            if (0..ATTEMPTS).all(|_| measured() > MOST) {
+                dear.push((tab.name(), scale));
             }
         }
     }
-    assert!(dear.is_empty(), "{dear:.2?}");
+    assert!(dear.is_empty(), "more than {MOST} of plain widgets: {dear:?}");
 }

@@ -138,7 +138,7 @@ async function made({ samples, messages }) {
 /** Draws the sound, and how much of it has been heard. */
 function follow(own, canvas) {
   const ratio = devicePixelRatio || 1;
-  // On a telephone, one that was never drawn is hidden and has no size.
+  // On a telephone, one without a width is hidden (`style.css`) and could not be measured.
   canvas.width = 1;
   [canvas.width, canvas.height] = [ratio * canvas.clientWidth, ratio * canvas.clientHeight];
   const g = canvas.getContext('2d');

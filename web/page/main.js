@@ -75,6 +75,7 @@ const typing = new Typing(hands, (breath) => breathe(breath, 'letters'), (said) 
     takeBreath();
   }
   if (said.silence) {
+    breaths.clear();
     hands.silence();
     knob.stop();
   }
@@ -400,6 +401,8 @@ async function toggleMicrophone() {
   if (blowing) {
     blowing = false;
     engine.closeMicrophone();
+    // A finger may have stayed.
+    if (breaths.size > 0) engine.send({ breath: [...breaths.values()].at(-1) });
     hands.blow(knob.plays, instrument.transposition);
   } else {
     isOpening = true;

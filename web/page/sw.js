@@ -24,7 +24,7 @@ addEventListener('install', (event) => {
   const keep = async () => {
     // Who has had the large file once can go on without a network after an update, too.
     if (await hadLater()) all.push(new Request(LATER, { cache: 'reload' }));
-    // All of them, or none.
+    // What cannot be fetched whole is not kept at all.
     const answers = await Promise.all(all.map(whole));
     const cache = await caches.open(NAME);
     await Promise.all(all.map((request, at) => cache.put(request, answers[at])));

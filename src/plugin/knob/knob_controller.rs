@@ -21,8 +21,9 @@ use chalumeau_knob::touch::take::TakeRow;
 /// Who carries out the switches, in "... has stood still".
 const SWITCHES: &str = "the plugin's thread for the knob's switches";
 
-/// After a saved state has been loaded, how long a change of the knob may be part of it: the host sets one value after another.
-const LOADING: Duration = Duration::from_secs(1);
+/// How long the loading of a saved state may take, which sets one value after another: a change of the knob within that time before
+/// or after it is part of it.
+const LOADING: Duration = Duration::from_millis(300);
 
 /// How often the rows of a take are counted for the user.
 const COUNT_EVERY: Duration = Duration::from_secs(1);
@@ -40,6 +41,8 @@ pub struct KnobController {
     last_choice: Option<KnobChoice>,
     /// How often a saved state has been loaded, and when that was noticed.
     loaded: (u32, Option<Instant>),
+    /// When another knob was chosen whose rest is not known.
+    another: Option<Instant>,
     /// The serial number that this instance has put into the project for *any knob*.
     remembered: Option<u64>,
     /// Where the link's thread sends rows of takes.
@@ -72,6 +75,7 @@ impl KnobController {
             choice: KnobChoice::Off,
             last_choice: None,
             loaded: (0, None),
+            another: None,
             remembered: None,
             rows,
             angles: mpsc::channel(),
@@ -98,8 +102,12 @@ impl KnobController {
         let knob = &params.knob;
         if params.loads() != self.loaded.0 {
             self.loaded = (params.loads(), Some(Instant::now()));
+            self.another = None;
         }
         self.choose_device(knob);
+        if self.another.take_if(|chosen| chosen.elapsed() >= LOADING).is_some() {
+            self.forget_rest(knob);
+        }
         let status = self.link.as_ref().map(|(link, _)| link.status());
         match (&status, &self.link) {
             (Some(status), Some((link, heart))) => {
@@ -168,7 +176,7 @@ impl KnobController {
             // A saved state has the rest of its own knob.
             let is_loaded = self.loaded.1.is_some_and(|at| at.elapsed() < LOADING);
             if !is_loaded && self.last_choice.as_ref().is_some_and(|last| is_another(last, &wanted)) {
-                self.forget_rest(knob);
+                self.another = Some(Instant::now());
             }
             self.last_choice = Some(wanted.clone());
         }

@@ -75,7 +75,7 @@ pub struct SlowWork {
     /// Rows that the link's thread sends.
     rows: mpsc::Receiver<TakeRow>,
     recorder: TakeRecorder,
-    /// *Record take* is still on, although nothing can be written.
+    /// Nothing could be written since *Record take* was switched on.
     has_failed: bool,
     /// The take that is replayed, and its path; empty for none.
     replayed: Option<Arc<Take>>,

@@ -98,7 +98,8 @@ impl TakeRecorder {
         self.recording.as_ref().map(|recording| recording.rows)
     }
 
-    /// Completes the open take, as far as it could be written, and makes it the take of the project. Returns a message for the user, if a take was open.
+    /// Completes the open take, as far as it could be written, and makes it the take of the project. Returns a message for the
+    /// user, if a take was open.
     pub fn end(&mut self, params: &ChalumeauParams) -> Option<String> {
         if !self.has_failed() {
             self.write_until(u64::MAX);
@@ -108,16 +109,17 @@ impl TakeRecorder {
         if rows == 0 && error.is_none() {
             return Some("nothing recorded: the knob sent nothing".to_owned());
         }
-        let KeptLines { path, cut } = match writer.keep_lines() {
-            Ok(kept) => kept,
-            Err(reason) => return Some(format!("take lost: {reason}")),
+        let KeptLines { path, cut } = match (writer.keep_rows(), &error) {
+            (Ok(kept), _) => kept,
+            (Err(_), Some(reason)) => return Some(format!("take lost: {reason}")),
+            (Err(reason), None) => return Some(format!("take lost: {reason}")),
         };
         let path = path.display().to_string();
         let text = match error.or(cut) {
             Some(reason) => format!("take {path} ends early: {reason}"),
             None => format!("take {path} has {rows} rows"),
         };
-        // A project that has been loaded meanwhile has a take of its own.
+        // A state that has been loaded meanwhile has a take of its own; the message says where this one is.
         if params.loads() == loads {
             if let Ok(mut take) = params.knob.take.write() {
                 *take = path;

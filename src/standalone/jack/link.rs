@@ -328,7 +328,12 @@ impl LinkThread {
         let was_connected =
             |name: &String| self.noted[1].iter().any(|noted| noted.own == MIDI_INPUT && noted.other == *name);
         let is_back = new.iter().any(was_connected);
-        let Some(known) = &mut self.keyboards else { return is_back };
+        let Some(known) = &mut self.keyboards else {
+            let back =
+                self.noted[1].iter().filter(|noted| noted.own == MIDI_INPUT && new.contains(&noted.other));
+            self.pending.extend(back.cloned());
+            return is_back;
+        };
         known.retain(|name| !new.contains(name));
         let there: HashSet<_> = client.keyboards().into_iter().collect();
         for other in there.difference(known) {

@@ -68,7 +68,9 @@ impl JackPlayer {
         let JackPlayerPorts { outputs, microphone, midi_input, midi_output } = &mut self.ports;
         let mut channels = outputs.each_mut().map(|port| port.as_mut_slice(scope));
         self.sent.clear();
-        let lets_go = self.signs.lets_go.swap(false, Ordering::Relaxed);
+        // The link thread holds the lock while it starts the plugin.
+        let plugin = self.plugin.try_lock();
+        let lets_go = plugin.is_ok() && self.signs.lets_go.swap(false, Ordering::Relaxed);
         let mut context = CycleContext {
             endings: if lets_go { &LET_GO } else { &[] },
             incoming: midi_input.iter(scope),
@@ -76,8 +78,7 @@ impl JackPlayer {
             sent: &mut self.sent,
             transport: &self.transport,
         };
-        // The link thread holds the lock while it starts the plugin.
-        let status = match self.plugin.try_lock() {
+        let status = match plugin {
             Ok(mut plugin) => {
                 plugin.hear(&[microphone.as_slice(scope)]);
                 plugin.play::<Chalumeau>(&mut channels, &mut context)

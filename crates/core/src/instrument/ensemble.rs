@@ -126,12 +126,7 @@ impl Seat {
             | Event::TryHoles(_)
             | Event::Hole { .. } => self.lateness.take(event, most),
             Event::Panic => {
-                // What a wheel or a key switch has said stays, in every player.
-                while let Some(event) = self.lateness.next() {
-                    if !is_of_key(event) {
-                        self.apply(event);
-                    }
-                }
+                self.drop_keys();
                 Some(event)
             }
             // What is cut has begun.
@@ -155,9 +150,18 @@ impl Seat {
         }
     }
 
+    /// No key goes down or comes up that waited. What a wheel or a key switch has said stays, in every player.
+    fn drop_keys(&mut self) {
+        while let Some(event) = self.lateness.next() {
+            if !is_of_key(event) {
+                self.apply(event);
+            }
+        }
+    }
+
     /// All keys come up, and none goes down that waited.
     fn let_go(&mut self) {
-        self.lateness.forget();
+        self.drop_keys();
         self.clarinet.let_go();
     }
 

@@ -14,7 +14,7 @@ const PREPARE_S: f64 = 0.005;
 /// rung out.
 const STAY_S: f64 = 0.25;
 const RETURN_S: f64 = 0.1;
-/// Mouth over closing pressure below which a note that ends does not fall: it has faded already. No note holds there.
+/// Mouth over closing pressure below which a note that ends does not fall, and a fall ends: it has faded already. No note holds there.
 const FADED_GAMMA: f64 = 0.2;
 
 /// What the pitch does.
