@@ -340,6 +340,10 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     }
     breath.look(&snapshot.sources, ui.input(|input| input.time));
     trial.keep_to(snapshot, &mut actions);
+    if tab != Tab::Knob || is_blind || presets.is_open || files.is_open() {
+        // The hand would go on feeling a test that no view shows.
+        knob.end_test(&mut actions);
+    }
     // A window that has grown past the screen hides the list of sizes.
     if keyboard.has_letters()
         && ui.input_mut(|input| input.consume_key(egui::Modifiers::COMMAND, egui::Key::Num0))
@@ -382,10 +386,6 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, kept.names, snapshot, is_text, &mut actions));
     // A pressure would tell one setting from another.
     let has_meter = tab != Tab::Play && !is_blind;
-    if tab != Tab::Knob || is_blind || presets.is_open || files.is_open() {
-        // The hand would go on feeling a test that no view shows.
-        knob.end_test(&mut actions);
-    }
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
     if has_meter {

@@ -37,6 +37,8 @@ pub fn begin(options: &'static LaunchOptions) {
     if options.quit.swap(true, Ordering::Relaxed) {
         return;
     }
+    // First: torque waits for nothing.
+    StandalonePlugin::interrupt();
     let (saved, is_saved) = channel();
     let _ = std::thread::Builder::new().name("QuitWatch".to_owned()).spawn(move || {
         if is_saved.recv_timeout(KNOB_PATIENCE).is_ok() {
@@ -50,8 +52,8 @@ pub fn begin(options: &'static LaunchOptions) {
         end(options);
         std::process::exit(0);
     });
-    // The sound system may never let the program come to the end, at which both are done, too. The session first: nothing holds it
-    // up but the disk. And again with the take that has ended.
+    // The sound system may never let the program come to the end, at which both are done, too. The session first, which only
+    // the disk can hold up, and again with the take that has ended.
     StandalonePlugin::save();
     StandalonePlugin::leave_knob();
     StandalonePlugin::save();

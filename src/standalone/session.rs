@@ -80,6 +80,11 @@ impl Session {
         Some(session)
     }
 
+    /// The parameters that it keeps.
+    pub fn params(&self) -> &ChalumeauParams {
+        &self.0.params
+    }
+
     fn at(path: PathBuf, params: Arc<ChalumeauParams>, options: Option<&LaunchOptions>) -> Self {
         let written = match read(&path) {
             Ok(None) => Vec::new(),

@@ -145,7 +145,14 @@ impl StandalonePlugin {
         }
     }
 
-    /// Takes the torque of the knob away and completes the take that is open.
+    /// Takes the torque of the knob away. Neither the sound nor a disk holds this up.
+    pub fn interrupt() {
+        if let Some(Self { session: Some(session), .. }) = &*locked(&PLAYING) {
+            session.params().moments.interrupt();
+        }
+    }
+
+    /// Ends the link to the knob and completes the take that is open.
     pub fn leave_knob() {
         // Not under the lock: others look for the plugin meanwhile.
         let playing = locked(&PLAYING).clone();

@@ -92,6 +92,15 @@ impl Moments {
         let _ = self.arm_heart.set(heart);
     }
 
+    /// Takes the torque of the knob away: the user ends the program. Waits for nothing.
+    #[cfg(feature = "standalone")]
+    pub fn interrupt(&self) {
+        #[cfg(feature = "devices")]
+        if let Some(heart) = self.arm_heart.get() {
+            heart.let_go(Release::Interrupted);
+        }
+    }
+
     /// The control was moved. *Arm knob* lets go at once when it goes off, and waits for no other thread.
     fn moved(&self, control: Moment, is_on: bool) {
         if is_on {
