@@ -732,10 +732,9 @@ const MICROPHONE = {
 };
 
 const tests = running(process.argv[4]);
-const browser = await launch(own);
-await tests.run(TESTS, browser);
-if (process.argv[4]?.startsWith('timed')) await tests.run(TIMED, browser);
-await browser.close();
-await tests.run(MICROPHONE);
+await tests.run(() => launch(own), TESTS);
+if (process.argv[4]?.startsWith('timed')) await tests.run(() => launch(own), TIMED);
+// Each has a browser of its own, which hears its file.
+await tests.run(() => {}, MICROPHONE);
 server.close();
 tests.end();

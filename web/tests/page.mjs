@@ -93,27 +93,55 @@ export const settled = async (page, place) => {
 };
 export const silence = (page) => until(page, LEVEL, 0, SILENT);
 
-/** Runs tests, all or those with `wanted` in their names, each after `begin`, and ends the program with their result. */
+/**
+ * Runs tests, all or those with `wanted` in their names, each after `begin`, and ends the program with their result. A test that
+ * fails runs once more, in a new browser: on a busy machine a browser may stand still for longer than a test waits. What failed is
+ * said again at the end.
+ */
 export function running(wanted = '', begin = () => {}) {
-  let [failed, ran] = [0, 0];
+  let ran = 0;
+  const failures = [];
+  /** Whether it passed. */
+  async function passes(name, test, browser) {
+    const began = Date.now();
+    begin();
+    try {
+      const says = await test(browser);
+      console.log(`ok    ${name} (${((Date.now() - began) / 1000).toFixed(1)} s)${says ? `: ${says}` : ''}`);
+      return true;
+    } catch (error) {
+      const failure = `${name}\n${error.stack}`;
+      console.log(`FAIL  ${failure}`);
+      failures.push({ name, failure });
+      return false;
+    }
+  }
+  async function inBrowser(start, tests) {
+    const browser = await start();
+    const again = [];
+    for (const [name, test] of tests) {
+      if (!(await passes(name, test, browser))) again.push([name, test]);
+    }
+    // One that has crashed is closed already.
+    await browser?.close().catch(() => {});
+    return again;
+  }
+  const failed = new Set();
   return {
-    async run(tests, ...args) {
-      for (const [name, test] of Object.entries(tests).filter(([name]) => name.includes(wanted))) {
-        const began = Date.now();
-        ran += 1;
-        begin();
-        try {
-          const says = await test(...args);
-          console.log(`ok    ${name} (${((Date.now() - began) / 1000).toFixed(1)} s)${says ? `: ${says}` : ''}`);
-        } catch (error) {
-          failed += 1;
-          console.log(`FAIL  ${name}\n${error.stack}`);
-        }
-      }
+    /** `start` makes the browser in which they run, or nothing. */
+    async run(start, ...groups) {
+      const tests = groups.flatMap((tests) => Object.entries(tests)).filter(([name]) => name.includes(wanted));
+      if (tests.length === 0) return;
+      ran += tests.length;
+      const again = await inBrowser(start, tests);
+      if (again.length === 0) return;
+      console.log(`again, in a new browser: ${again.map(([name]) => name).join('; ')}`);
+      for (const [name] of await inBrowser(start, again)) failed.add(name);
     },
     end() {
       if (ran === 0) console.log(`FAIL  no test has ${wanted} in its name`);
-      process.exitCode = failed > 0 || ran === 0 ? 1 : 0;
+      for (const { name, failure } of failures) console.log(`${failed.has(name) ? 'failed' : 'failed, but not again'}: ${failure}`);
+      process.exitCode = failed.size > 0 || ran === 0 ? 1 : 0;
     },
   };
 }

@@ -991,8 +991,6 @@ const VERSIONS = {
 
 // What a test has taken away is there for the next.
 const tests = running(process.argv[4], () => server.instead.clear());
-const browser = await launch(own);
-for (const group of [SILENCE, MIDI, HOLES, HANDS, LOOKS, VERSIONS]) await tests.run(group, browser);
-await browser.close();
+await tests.run(() => launch(own), SILENCE, MIDI, HOLES, HANDS, LOOKS, VERSIONS);
 server.close();
 tests.end();

@@ -142,6 +142,8 @@ struct Done {
     step: &'static Step,
     passed: bool,
     took: Duration,
+    /// Where it wrote, if it ran beside others.
+    log: Option<PathBuf>,
 }
 
 /// `cargo xtask ci [word..]`: all steps, or those whose name contains one of the words.
@@ -171,8 +173,14 @@ pub fn run(words: &[String]) -> Result<()> {
             }
         }
     }
+    // Once more: what follows a failure may be long.
+    for Done { step, log, .. } in report.iter().filter(|done| !done.passed) {
+        if let Some(log) = log {
+            println!("\n=== {} FAILED, and wrote at its end:\n{}", step.name, beside::end_of(log));
+        }
+    }
     println!();
-    for Done { step, passed, took } in &report {
+    for Done { step, passed, took, .. } in &report {
         println!("{:>10}  {}  {}", spoken(*took), if *passed { "passed" } else { "FAILED" }, step.name);
     }
     let failed = report.iter().filter(|done| !done.passed).count();
@@ -190,7 +198,7 @@ fn done(step: &'static Step) -> Done {
     }
     let took = began.elapsed();
     println!("=== {}: {}", step.name, spoken(took));
-    Done { step, passed: result.is_ok(), took }
+    Done { step, passed: result.is_ok(), took, log: None }
 }
 
 fn cores() -> usize {

@@ -219,8 +219,8 @@ fn finish_interrupted() -> Result<()> {
 
 fn apt(args: &[&str]) -> Result<()> {
     let mut command = as_root("apt-get");
-    // Another apt may hold the lock for a while.
-    command.args(["-q", "-o", "DPkg::Lock::Timeout=500"]).args(args);
+    // Another apt may hold the lock for a while, and a mirror may fail now and then.
+    command.args(["-q", "-o", "DPkg::Lock::Timeout=500", "-o", "Acquire::Retries=3"]).args(args);
     run(&mut command).context("install the packages named above by hand, then try again")
 }
 
